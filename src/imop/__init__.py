@@ -1,0 +1,1 @@
+"""imop: a robot arm learns a manipulation task from one demonstration, without retraining."""

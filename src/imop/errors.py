@@ -1,0 +1,60 @@
+"""Every error that imop raises on purpose derives from `ImopError` and names what would be accepted."""
+
+from pathlib import Path
+from typing import Literal
+
+
+class ImopError(Exception):
+    """Base of all errors raised on purpose."""
+
+
+class InvalidInput(ImopError, ValueError):
+    """A value handed to imop does not have the required shape, type, unit or range."""
+
+    def __init__(self, field: str, problem: str, accepted: str):
+        self.field, self.problem, self.accepted = field, problem, accepted
+        super().__init__(f"{field}: {problem}; accepted: {accepted}")
+
+
+class CorruptData(ImopError):
+    """A file or folder on disk cannot be read as what it claims to be."""
+
+    def __init__(self, path: Path | str, problem: str, remedy: str = "restore it or record it again"):
+        self.path, self.problem, self.remedy = Path(path), problem, remedy
+        super().__init__(f"{path}: {problem}; remedy: {remedy}")
+
+
+PlanFailure = Literal[
+    "outside_workspace",
+    "unreachable",
+    "start_in_collision",
+    "goal_in_collision",
+    "no_path",
+    "no_straight_path",
+    "no_timing",
+    "in_motion_collision",
+]
+
+
+class PlanFailed(ImopError):
+    """No motion was found within the time allowed; `reason` says at which stage."""
+
+    def __init__(self, reason: PlanFailure, detail: str = ""):
+        self.reason: PlanFailure = reason
+        super().__init__(f"T_world_gripper: no motion ({reason}){': ' + detail if detail else ''}")
+
+
+class NoConfidentMatch(ImopError):
+    """The demonstrated step could not be found in the scene with the confidence asked for."""
+
+    def __init__(self, confidence: float, required: float):
+        self.confidence, self.required = confidence, required
+        super().__init__(f"confidence: {confidence:.2f} is below the required {required:.2f}")
+
+
+class MissingExtra(ImopError):
+    """An optional dependency is not installed."""
+
+    def __init__(self, module: str, extra: str):
+        self.module, self.extra = module, extra
+        super().__init__(f"{module} is not installed; install it with: pip install 'imop[{extra}]'")

@@ -1,0 +1,269 @@
+"""The values that flow through imop: views -> observations -> keyframes -> demonstrations -> actions.
+
+All are frozen and validated once, when they are made. World frame: z up, metres, radians. `T_a_b` is a
+(4, 4) float64 matrix that maps points of frame b into frame a. The gripper frame is RLBench's tip frame:
+origin between the finger tips, +z the approach direction, y the closing direction.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imop.errors import InvalidInput
+
+FloatArray = NDArray[np.float64]
+Float32Array = NDArray[np.float32]
+IntArray = NDArray[np.int32]
+ByteArray = NDArray[np.uint8]
+BoolArray = NDArray[np.bool_]
+
+
+def as_array(name: str, value: Any, shape: tuple[int | None, ...], dtype: Any = np.float64) -> NDArray[Any]:
+    """Convert `value` to a read-only array of `dtype`; None in `shape` accepts any length.
+
+    Raises:
+        InvalidInput: if it is not numeric or has another shape.
+    """
+    wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + f") {np.dtype(dtype).name}"
+    try:
+        array = np.array(value, dtype=dtype)
+    except (TypeError, ValueError) as error:
+        raise InvalidInput(name, f"not an array ({error})", wanted) from error
+    if array.ndim != len(shape) or any(
+        n is not None and n != m for n, m in zip(shape, array.shape, strict=True)
+    ):
+        raise InvalidInput(name, f"shape {array.shape}", wanted)
+    array.setflags(write=False)
+    return array
+
+
+def as_pose(name: str, value: Any) -> FloatArray:
+    """Convert `value` to a rigid transformation, (4, 4) float64.
+
+    Raises:
+        InvalidInput: if it is not (4, 4), not finite, or its rotation is not orthonormal with determinant 1.
+    """
+    T = as_array(name, value, (4, 4))
+    accepted = "a (4, 4) rigid transformation: orthonormal rotation, determinant +1, last row 0 0 0 1"
+    if not np.all(np.isfinite(T)):
+        raise InvalidInput(name, "not finite", accepted)
+    R = T[:3, :3]
+    if np.abs(R @ R.T - np.eye(3)).max() > 1e-4 or np.linalg.det(R) < 0:
+        raise InvalidInput(name, "rotation is not orthonormal and right-handed", accepted)
+    if not np.allclose(T[3], (0, 0, 0, 1), atol=1e-8):
+        raise InvalidInput(name, f"last row is {T[3].tolist()}", accepted)
+    return T
+
+
+def _set(instance: object, **values: object) -> None:
+    for name, value in values.items():
+        object.__setattr__(instance, name, value)
+
+
+@dataclass(frozen=True, eq=False)
+class CameraView:
+    """One registered RGB-D image.
+
+    Pixel (u, v) with depth d is the camera-frame point inv(K) (u d, v d, d): x to the right, y down, z
+    forward, integer pixel coordinates from the top left corner.
+
+    Attributes:
+        rgb: (H, W, 3) uint8.
+        depth: (H, W) float32, metres along the optical axis; 0, NaN and inf mean no measurement.
+        intrinsics: (3, 3) float64, pixels, positive focal lengths.
+        T_world_camera: (4, 4) float64.
+        instance_ids: (H, W) int32 or None; only training may read it.
+    """
+
+    rgb: ByteArray
+    depth: Float32Array
+    intrinsics: FloatArray
+    T_world_camera: FloatArray
+    instance_ids: IntArray | None = None
+
+    def __post_init__(self) -> None:
+        rgb = as_array("rgb", self.rgb, (None, None, 3), np.uint8)
+        image = rgb.shape[:2]
+        K = as_array("intrinsics", self.intrinsics, (3, 3))
+        if not (np.all(np.isfinite(K)) and K[0, 0] > 0 and K[1, 1] > 0 and np.allclose(K[2], (0, 0, 1))):
+            raise InvalidInput(
+                "intrinsics", f"{K.tolist()}", "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]], fx, fy > 0"
+            )
+        ids = self.instance_ids
+        _set(
+            self,
+            rgb=rgb,
+            depth=as_array("depth", self.depth, image, np.float32),
+            intrinsics=K,
+            T_world_camera=as_pose("T_world_camera", self.T_world_camera),
+            instance_ids=None if ids is None else as_array("instance_ids", ids, image, np.int32),
+        )
+
+    @property
+    def measured(self) -> BoolArray:
+        """(H, W) True where depth is a measurement."""
+        return np.isfinite(self.depth) & (self.depth > 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """What the robot knows at one moment.
+
+    Attributes:
+        views: camera name -> view; at least one.
+        T_world_gripper: (4, 4).
+        gripper_opening: 0 closed .. 1 fully open (fraction of the stroke).
+        time_step: number of keyframes reached so far in this episode.
+        joint_positions: (n,) radians or None. The Panda's follow Franka's convention.
+        joint_velocities: (n,) radians per second or None; no policy reads them.
+        instance_names: what the instance ids of the views are called; only training may read it.
+    """
+
+    views: Mapping[str, CameraView]
+    T_world_gripper: FloatArray
+    gripper_opening: float
+    time_step: int = 0
+    joint_positions: FloatArray | None = None
+    joint_velocities: FloatArray | None = None
+    instance_names: Mapping[int, str] | None = None
+
+    def __post_init__(self) -> None:
+        if not self.views:
+            raise InvalidInput("views", "empty", "at least one camera view")
+        opening = float(self.gripper_opening)
+        if not -0.01 <= opening <= 1.01:
+            raise InvalidInput(
+                "gripper_opening", f"{opening}", "a fraction of the stroke, 0 closed .. 1 open"
+            )
+        q, dq = self.joint_positions, self.joint_velocities
+        _set(
+            self,
+            views=dict(self.views),
+            T_world_gripper=as_pose("T_world_gripper", self.T_world_gripper),
+            gripper_opening=min(max(opening, 0.0), 1.0),
+            time_step=int(self.time_step),
+            joint_positions=None if q is None else as_array("joint_positions", q, (None,)),
+            joint_velocities=None if dq is None else as_array("joint_velocities", dq, (None,)),
+        )
+
+    def stripped(self) -> "Observation":
+        """The same observation without anything that only training or a simulator knows."""
+        views = {name: replace(view, instance_ids=None) for name, view in self.views.items()}
+        return replace(self, views=views, joint_velocities=None, instance_names=None)
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """Why an action was predicted: matched points, for people to look at.
+
+    Attributes:
+        step: index of the demonstrated step that was transferred.
+        p_support: (N, 3) points of the demonstrated scene, world frame of the demonstration.
+        p_query: (N, 3) their counterparts in the observed scene, world frame.
+        region: (M, 3) the whole invariant region in the demonstrated scene.
+    """
+
+    step: int
+    p_support: FloatArray
+    p_query: FloatArray
+    region: FloatArray
+
+    def __post_init__(self) -> None:
+        _set(
+            self,
+            p_support=as_array("p_support", self.p_support, (None, 3)),
+            p_query=as_array("p_query", self.p_query, (len(self.p_support), 3)),
+            region=as_array("region", self.region, (None, 3)),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Action:
+    """A gripper pose to reach, then the state of the gripper (the paper's a = (T, λ)).
+
+    Attributes:
+        T_world_gripper: (4, 4).
+        gripper_open: state of the gripper after the motion.
+        allow_collisions: whether the motion may touch things.
+        confidence: 0 .. 1.
+        match: the evidence, or None for actions that were not predicted by matching.
+    """
+
+    T_world_gripper: FloatArray
+    gripper_open: bool
+    allow_collisions: bool = False
+    confidence: float = 1.0
+    match: Match | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.confidence <= 1.0:
+            raise InvalidInput("confidence", f"{self.confidence}", "a number between 0 and 1")
+        _set(
+            self,
+            T_world_gripper=as_pose("T_world_gripper", self.T_world_gripper),
+            gripper_open=bool(self.gripper_open),
+            allow_collisions=bool(self.allow_collisions),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Keyframe:
+    """One demonstrated step: what was seen, and the action that led to the next keyframe.
+
+    Attributes:
+        observation: the support state s_i.
+        action: T_i and λ_i.
+        object_name: the object whose frame the action is fixed to, if a simulator said so; privileged.
+        T_world_object: its pose at `observation`; privileged.
+    """
+
+    observation: Observation
+    action: Action
+    object_name: str | None = None
+    T_world_object: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        if self.T_world_object is not None:
+            _set(self, T_world_object=as_pose("T_world_object", self.T_world_object))
+
+
+@dataclass(frozen=True, eq=False)
+class Demonstration:
+    """One successful episode as macro-steps.
+
+    Attributes:
+        keyframes: the steps; the state after step k is `after(k)`.
+        final: what was seen after the last action.
+        task: "suite/name", for bookkeeping; no policy reads it.
+        variation: number of the task's variation.
+        instructions: the variation in words.
+        seeds: instance and episode seed of the scene, where there is one.
+    """
+
+    keyframes: tuple[Keyframe, ...]
+    final: Observation
+    task: str = ""
+    variation: int = 0
+    instructions: tuple[str, ...] = ()
+    seeds: Mapping[str, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not self.keyframes:
+            raise InvalidInput("keyframes", "the demonstration has no keyframe", "at least one step")
+        _set(self, keyframes=tuple(self.keyframes), instructions=tuple(self.instructions))
+
+    def __len__(self) -> int:
+        return len(self.keyframes)
+
+    def after(self, step: int) -> Observation:
+        """The state s_i' that step `step` led to."""
+        last = len(self.keyframes) - 1
+        return self.final if step == last else self.keyframes[step + 1].observation
+
+    def stripped(self) -> "Demonstration":
+        """The same demonstration without anything that only training or a simulator knows."""
+        keyframes = tuple(Keyframe(k.observation.stripped(), k.action) for k in self.keyframes)
+        return Demonstration(keyframes, self.final.stripped())
