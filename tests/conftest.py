@@ -1,0 +1,26 @@
+"""Fixtures shared by all tests."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import settings
+
+settings.register_profile("imop", deadline=None, max_examples=40, derandomize=True)
+settings.load_profile("imop")
+
+SHARED = Path(__file__).resolve().parents[2] / "shared"
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
+@pytest.fixture(scope="session")
+def rlbench_demos() -> Path:
+    """Folder of real RLBench demonstrations, which may not be redistributed."""
+    path = SHARED / "data" / "rlbench_demos"
+    if not path.is_dir():
+        pytest.skip("real RLBench demonstrations are not part of the repository (../shared/data/rlbench_demos)")
+    return path
