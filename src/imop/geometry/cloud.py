@@ -1,0 +1,188 @@
+"""Point clouds in the world frame: fused from views, cropped, thinned, with normals."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import fpsample
+import numpy as np
+import small_gicp
+from numpy.typing import NDArray
+
+from imop.errors import InvalidInput
+from imop.geometry import se3
+from imop.types import BoolArray, CameraView, Float32Array, FloatArray, IntArray, Observation
+
+# A pixel that hangs this far (metres) between its two neighbours belongs to neither surface.
+FLYING_PIXEL_GAP = 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class PointCloud:
+    """Points of a scene and what is known of each.
+
+    Attributes:
+        points: (N, 3) float64, world frame, metres.
+        colors: (N, 3) float32, 0 .. 1.
+        camera: (N,) int32, number of the view (in the observation's order) that saw the point.
+        normals: (N, 3) float64 unit vectors towards the camera, or None.
+        ids: (N,) int32 instance ids, or None; only training may read them.
+    """
+
+    points: FloatArray
+    colors: Float32Array
+    camera: IntArray
+    normals: FloatArray | None = None
+    ids: IntArray | None = None
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def select(self, which: NDArray[np.bool_] | NDArray[np.integer]) -> "PointCloud":
+        """The points picked by a mask (N,) or by indices."""
+        return PointCloud(
+            self.points[which],
+            self.colors[which],
+            self.camera[which],
+            None if self.normals is None else self.normals[which],
+            None if self.ids is None else self.ids[which],
+        )
+
+
+def unproject(view: CameraView) -> FloatArray:
+    """(H, W, 3) world-frame points of every pixel; meaningless where depth is no measurement."""
+    height, width = view.depth.shape
+    u, v = np.meshgrid(np.arange(width), np.arange(height))
+    depth = np.where(view.measured, view.depth, 0.0).astype(np.float64)
+    rays = np.stack([u, v, np.ones_like(u)], axis=-1) @ np.linalg.inv(view.intrinsics).T
+    return se3.apply(view.T_world_camera, (rays * depth[..., None]).reshape(-1, 3)).reshape(height, width, 3)
+
+
+def flying_pixels(view: CameraView, gap: float = FLYING_PIXEL_GAP) -> BoolArray:
+    """(H, W) True where a pixel lies more than `gap` behind one neighbour and before the opposite one."""
+    depth = np.where(view.measured, view.depth, np.nan)
+    flying = np.zeros(depth.shape, dtype=bool)
+    for axis in (0, 1):
+        before, here, after = (
+            np.take(depth, range(k, depth.shape[axis] - 2 + k), axis=axis) for k in (0, 1, 2)
+        )
+        with np.errstate(invalid="ignore"):
+            hangs = (np.minimum(here - before, after - here) > gap) | (
+                np.minimum(before - here, here - after) > gap
+            )
+        inner = [slice(None), slice(None)]
+        inner[axis] = slice(1, -1)
+        flying[tuple(inner)] |= hangs
+    return flying
+
+
+def fuse(observation: Observation) -> PointCloud:
+    """All measured points of all views, without flying pixels.
+
+    Raises:
+        InvalidInput: if no view has a single measurement.
+    """
+    parts = []
+    with_ids = all(view.instance_ids is not None for view in observation.views.values())
+    for number, view in enumerate(observation.views.values()):
+        keep = view.measured & ~flying_pixels(view)
+        ids = view.instance_ids[keep] if with_ids and view.instance_ids is not None else None
+        camera = np.full(keep.sum(), number, dtype=np.int32)
+        parts.append(
+            PointCloud(
+                unproject(view)[keep], view.rgb[keep].astype(np.float32) / np.float32(255), camera, None, ids
+            )
+        )
+    cloud = concatenate(parts)
+    if not len(cloud):
+        raise InvalidInput(
+            "depth",
+            "no view has a measurement: every pixel is 0, NaN or inf",
+            "metres along the optical axis in at least one view",
+        )
+    return cloud
+
+
+def concatenate(clouds: Sequence[PointCloud]) -> PointCloud:
+    """One cloud of several; normals and ids survive if all of them have them."""
+    normals = [c.normals for c in clouds if c.normals is not None]
+    ids = [c.ids for c in clouds if c.ids is not None]
+    return PointCloud(
+        np.concatenate([c.points for c in clouds]),
+        np.concatenate([c.colors for c in clouds]),
+        np.concatenate([c.camera for c in clouds]),
+        np.concatenate(normals) if len(normals) == len(clouds) else None,
+        np.concatenate(ids) if len(ids) == len(clouds) else None,
+    )
+
+
+def crop(
+    cloud: PointCloud, lower: FloatArray | Sequence[float], upper: FloatArray | Sequence[float]
+) -> PointCloud:
+    """The points inside the axis-aligned box, bounds (3,) in metres, included."""
+    inside = np.all((cloud.points >= np.asarray(lower)) & (cloud.points <= np.asarray(upper)), axis=1)
+    return cloud.select(inside)
+
+
+def voxel_downsample(cloud: PointCloud, size: float) -> PointCloud:
+    """One point per occupied cell of a grid with edge `size`, fixed to the world's origin.
+
+    Points, colours and normals are averages over the cell; camera and id are its first point's.
+
+    Raises:
+        InvalidInput: if `size` is not positive.
+    """
+    if not size > 0:
+        raise InvalidInput("size", f"{size}", "a positive edge length in metres")
+    cells = np.floor(cloud.points / size).astype(np.int64)
+    _, first, cell, counts = np.unique(
+        cells, axis=0, return_index=True, return_inverse=True, return_counts=True
+    )
+    cell = cell.reshape(-1)
+
+    def mean(values: NDArray[np.floating]) -> FloatArray:
+        columns = [np.bincount(cell, weights=column, minlength=len(counts)) for column in values.T]
+        return np.stack(columns, axis=1) / counts[:, None]
+
+    normals = None
+    if cloud.normals is not None:
+        normals = mean(cloud.normals)
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    return PointCloud(
+        mean(cloud.points),
+        mean(cloud.colors).astype(np.float32),
+        cloud.camera[first],
+        normals,
+        None if cloud.ids is None else cloud.ids[first],
+    )
+
+
+def farthest_points(points: FloatArray, count: int) -> NDArray[np.int64]:
+    """Indices (min(count, N),) of a well-spread subset of `points` (N, 3), beginning with the first point."""
+    if count >= len(points):
+        return np.arange(len(points))
+    chosen = fpsample.bucket_fps_kdline_sampling(points.astype(np.float32), count, h=5, start_idx=0)
+    return np.asarray(chosen, dtype=np.int64)
+
+
+def estimate_normals(cloud: PointCloud, viewpoints: FloatArray, neighbours: int = 16) -> PointCloud:
+    """The cloud with normals from the principal axes of each point's neighbours, turned to its camera.
+
+    Args:
+        cloud: the points.
+        viewpoints: (C, 3) origins of the cameras, in the order that `cloud.camera` counts them.
+        neighbours: how many nearest points make a tangent plane.
+
+    A cloud of fewer than five points has no tangent planes: its normals point at the cameras.
+    """
+    to_camera = viewpoints[cloud.camera] - cloud.points
+    to_camera /= np.maximum(np.linalg.norm(to_camera, axis=1, keepdims=True), 1e-12)
+    normals = to_camera.copy()
+    if len(cloud) >= 5:
+        target = small_gicp.PointCloud(cloud.points)
+        small_gicp.estimate_normals(target, num_neighbors=min(neighbours, len(cloud)), num_threads=1)
+        found = np.asarray(target.normals())[:, :3]
+        defined = np.linalg.norm(found, axis=1) > 0.5
+        normals[defined] = found[defined]
+    away = np.einsum("ij,ij->i", normals, to_camera) < 0
+    normals[away] *= -1
+    return PointCloud(cloud.points, cloud.colors, cloud.camera, normals, cloud.ids)

@@ -1,0 +1,112 @@
+"""From an observation to the cloud that everything else works on, with no privileged information."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from imop.errors import InvalidInput
+from imop.geometry import cloud as clouds
+from imop.geometry.cloud import PointCloud
+from imop.types import BoolArray, FloatArray, Observation
+
+# The crop that PerAct, RVT and IMOP use on RLBench, metres.
+WORKSPACE_LOWER = (-0.3, -0.5, 0.6)
+WORKSPACE_UPPER = (0.7, 0.5, 1.6)
+
+# Which of the points (N, 3) belong to the robot, given its joint positions and gripper opening.
+RobotMask = Callable[[FloatArray, FloatArray, float], BoolArray]
+
+
+@dataclass(frozen=True)
+class Plane:
+    """The supporting plane: points p with normal . p = offset; the normal points up."""
+
+    normal: FloatArray
+    offset: float
+
+    def height(self, points: FloatArray) -> FloatArray:
+        """Signed distance (N,) of points (N, 3) above the plane, metres."""
+        return np.asarray(points @ self.normal - self.offset)
+
+
+@dataclass(frozen=True)
+class Perception:
+    """Fuse, crop, remove the robot, thin to voxels, estimate normals, cap the number of points.
+
+    Attributes:
+        robot_mask: the self-filter; None leaves the robot in the cloud.
+        voxel: edge of the grid, metres.
+        max_points: more are thinned by farthest point sampling.
+        lower, upper: (3,) bounds of the workspace, metres.
+    """
+
+    robot_mask: RobotMask | None = None
+    voxel: float = 0.005
+    max_points: int = 60_000
+    lower: tuple[float, float, float] = WORKSPACE_LOWER
+    upper: tuple[float, float, float] = WORKSPACE_UPPER
+
+    def __call__(self, observation: Observation) -> PointCloud:
+        """The scene around the robot, with normals.
+
+        Raises:
+            InvalidInput: if no depth was measured, if nothing lies in the workspace, or if the self-filter
+                is on and the observation has no joint positions.
+        """
+        cloud = clouds.crop(clouds.fuse(observation), self.lower, self.upper)
+        if self.robot_mask is not None:
+            cloud = cloud.select(~self._robot(cloud, observation, self.robot_mask))
+        if not len(cloud):
+            accepted = f"points between {self.lower} and {self.upper} m, world frame"
+            raise InvalidInput("views", "nothing is left in the workspace", accepted)
+        cloud = clouds.voxel_downsample(cloud, self.voxel)
+        viewpoints = np.stack([view.T_world_camera[:3, 3] for view in observation.views.values()])
+        cloud = clouds.estimate_normals(cloud, viewpoints)
+        return cloud.select(clouds.farthest_points(cloud.points, self.max_points))
+
+    @staticmethod
+    def _robot(cloud: PointCloud, observation: Observation, robot_mask: RobotMask) -> BoolArray:
+        if observation.joint_positions is None:
+            accepted = "joint angles in radians, or Perception(robot_mask=None)"
+            raise InvalidInput("joint_positions", "missing, but the self-filter needs them", accepted)
+        return robot_mask(cloud.points, observation.joint_positions, observation.gripper_opening)
+
+
+def supporting_plane(cloud: PointCloud, tilt: float = 0.2, bin_height: float = 0.005) -> Plane | None:
+    """The most populated near-horizontal plane of a cloud with normals, or None if there is none.
+
+    Args:
+        cloud: needs normals.
+        tilt: how far (radians) the normal of a point of the plane may lean from the vertical.
+        bin_height: height of a slice when counting, metres.
+
+    Raises:
+        InvalidInput: if the cloud has no normals.
+    """
+    if cloud.normals is None:
+        raise InvalidInput("cloud.normals", "missing", "a cloud from Perception or estimate_normals")
+    level = cloud.points[cloud.normals[:, 2] > np.cos(tilt)]
+    if len(level) < 50:
+        return None
+    slices = np.floor(level[:, 2] / bin_height).astype(np.int64)
+    values, counts = np.unique(slices, return_counts=True)
+    height = (values[np.argmax(counts)] + 0.5) * bin_height
+    for reach in (2 * bin_height, bin_height):
+        near = level[np.abs(level[:, 2] - height) < reach]
+        center = near.mean(axis=0)
+        height = float(center[2])
+    normal = np.linalg.svd(near - center, full_matrices=False)[2][2]
+    normal = normal if normal[2] > 0 else -normal
+    # A thin strip determines no tilt; a table is level.
+    if normal[2] < np.cos(tilt):
+        normal = np.array([0.0, 0.0, 1.0])
+    return Plane(normal, float(normal @ center))
+
+
+def thin_plane(
+    cloud: PointCloud, plane: Plane, thickness: float = 0.008, spacing: float = 0.02
+) -> PointCloud:
+    """The cloud with the plane's points thinned to `spacing` metres: flat targets lie in it, so it stays."""
+    flat = np.abs(plane.height(cloud.points)) < thickness
+    return clouds.concatenate([cloud.select(~flat), clouds.voxel_downsample(cloud.select(flat), spacing)])

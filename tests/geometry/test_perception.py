@@ -1,0 +1,93 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from imop.errors import InvalidInput
+from imop.geometry import se3
+from imop.geometry.cloud import PointCloud, estimate_normals, fuse
+from imop.geometry.perception import Perception, supporting_plane, thin_plane
+from tests.geometry.test_cloud import flat_view, observation
+
+
+def table_with_box():
+    """Seen from above at 1.5 m: a table at 0.75 m with a box 0.1 m high on it."""
+    view = flat_view(size=96)
+    depth = view.depth.copy()
+    depth[40:56, 40:56] = 0.65
+    return observation(front=replace(view, depth=depth))
+
+
+def test_finds_the_table_and_not_the_box():
+    cloud = Perception()(table_with_box())
+    plane = supporting_plane(cloud)
+    np.testing.assert_allclose(plane.normal, (0, 0, 1), atol=1e-3)
+    assert plane.offset == pytest.approx(0.75, abs=1e-3)
+    assert np.ptp(plane.height(cloud.points)) == pytest.approx(0.1, abs=2e-3)
+
+
+def test_the_plane_is_thinned_but_not_deleted():
+    cloud = Perception()(table_with_box())
+    plane = supporting_plane(cloud)
+    thin = thin_plane(cloud, plane, spacing=0.05)
+    box, thin_box = (np.count_nonzero(plane.height(c.points) > 0.05) for c in (cloud, thin))
+    assert box == thin_box
+    assert 0 < len(thin) - thin_box < (len(cloud) - box) / 2
+
+
+def test_a_tilted_camera_does_not_tilt_the_plane(rng):
+    points = np.concatenate([rng.uniform(-0.4, 0.4, (4000, 2)), np.full((4000, 1), 0.75)], axis=1)
+    points[:, 2] += 0.05 * points[:, 0]
+    cloud = PointCloud(points, np.zeros((4000, 3), np.float32), np.zeros(4000, np.int32))
+    plane = supporting_plane(estimate_normals(cloud, np.array([[0, 0, 2.0]])))
+    assert np.abs(plane.height(points)).max() < 1e-3 + 0.05 * 0.4
+
+
+def test_no_plane_in_a_wall(rng):
+    points = rng.uniform(-0.4, 0.4, (1000, 3))
+    points[:, 0] = 0.3
+    cloud = PointCloud(points, np.zeros((1000, 3), np.float32), np.zeros(1000, np.int32))
+    assert supporting_plane(estimate_normals(cloud, np.array([[-2.0, 0, 0]]))) is None
+    with pytest.raises(InvalidInput, match="normals"):
+        supporting_plane(cloud)
+
+
+def test_everything_outside_the_workspace_is_an_error():
+    far = observation(front=flat_view(T_world_camera=se3.make(se3.euler(x=np.pi), (9.0, 0, 1.5))))
+    with pytest.raises(InvalidInput, match="workspace"):
+        Perception()(far)
+
+
+def test_the_robot_mask_gets_world_points_joints_and_opening():
+    seen = {}
+
+    def mask(points, joint_positions, opening):
+        seen.update(points=points, joints=joint_positions, opening=opening)
+        return points[:, 2] > 0.8
+
+    plain = table_with_box()
+    scene = replace(plain, joint_positions=np.arange(7.0))
+    assert Perception(robot_mask=mask)(scene).points[:, 2].max() < 0.8
+    np.testing.assert_array_equal(seen["joints"], np.arange(7.0))
+    assert seen["opening"] == 1.0 and len(seen["points"]) <= len(fuse(scene))
+    with pytest.raises(InvalidInput, match="joint_positions"):
+        Perception(robot_mask=mask)(plain)
+
+
+def test_the_cap_holds_and_the_result_repeats():
+    perception = Perception(max_points=300)
+    first, second = perception(table_with_box()), perception(table_with_box())
+    assert len(first) == 300
+    np.testing.assert_array_equal(first.points, second.points)
+
+
+def test_privileged_fields_change_nothing():
+    plain = table_with_box()
+    view = plain.views["front"]
+    told = replace(
+        plain,
+        views={"front": replace(view, instance_ids=np.ones_like(view.depth, dtype=np.int32))},
+        joint_velocities=np.ones(7),
+        instance_names={1: "box"},
+    )
+    np.testing.assert_array_equal(Perception()(plain).points, Perception()(told.stripped()).points)
