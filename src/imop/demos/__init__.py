@@ -1,0 +1,1 @@
+"""Demonstrations: finding keyframes, reading RLBench's files, storing and checking."""
