@@ -1,0 +1,1 @@
+"""Rolling policies out, counting successes, and showing what happened."""

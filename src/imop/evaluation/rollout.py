@@ -1,0 +1,111 @@
+"""One episode of one policy in one scene."""
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Protocol
+
+from imop.errors import NoConfidentMatch
+from imop.geometry import se3
+from imop.tasks.env import ImopEnv, to_array
+from imop.types import Action, Demonstration, FloatArray, Observation
+
+
+class Policy(Protocol):
+    """What can be rolled out: shown demonstrations, then asked for actions."""
+
+    def watch(self, demonstration: Demonstration) -> None:
+        """Remember one demonstration."""
+
+    def reset(self) -> None:
+        """Begin a new episode."""
+
+    def act(self, observation: Observation) -> Action:
+        """The next action."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One action of an episode.
+
+    Attributes:
+        support_step: demonstrated step that was transferred, or None.
+        position_error: metres to where the expert would go from the same state, or None if it has no say.
+        rotation_error: radians, likewise.
+        confidence: the policy's.
+        policy_seconds: time to decide.
+        motion_seconds: time to plan and simulate.
+        plan_failed: reason, if no motion was found.
+    """
+
+    support_step: int | None
+    position_error: float | None
+    rotation_error: float | None
+    confidence: float
+    policy_seconds: float
+    motion_seconds: float
+    plan_failed: str | None = None
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """How an episode went; `reason` says why it ended."""
+
+    success: bool
+    reason: str
+    steps: tuple[Step, ...]
+
+    def as_dict(self) -> dict[str, object]:
+        """Plain values for JSON."""
+        return asdict(self)
+
+
+def rollout(
+    env: ImopEnv,
+    policy: Policy,
+    steps: int,
+    expert_pose: Callable[[int], FloatArray | None] = lambda step: None,
+    on_action: Callable[[Observation, Action], None] = lambda observation, action: None,
+) -> Rollout:
+    """Act until success, failure or `steps` actions, in an environment that was just reset.
+
+    Args:
+        env: the environment.
+        policy: has watched its demonstrations.
+        steps: most actions allowed.
+        expert_pose: T_world_gripper of the expert for the step of the given number, from the state now.
+        on_action: called before each action is executed.
+    """
+    policy.reset()
+    taken: list[Step] = []
+    for number in range(steps):
+        observation = env.observation.stripped()
+        started = time.perf_counter()
+        try:
+            action = policy.act(observation)
+        except NoConfidentMatch:
+            return Rollout(False, "no confident match", tuple(taken))
+        decided = time.perf_counter()
+        support_step = action.match.step if action.match else None
+        wanted = expert_pose(number if support_step is None else support_step)
+        on_action(observation, action)
+        _, _, terminated, truncated, info = env.step(to_array(action))
+        reached = action.T_world_gripper
+        taken.append(
+            Step(
+                support_step,
+                None if wanted is None else float(se3.translation_distance(wanted, reached)),
+                None if wanted is None else float(se3.rotation_distance(wanted, reached)),
+                action.confidence,
+                decided - started,
+                time.perf_counter() - decided,
+                info.get("plan_failed"),
+            )
+        )
+        if info.get("success"):
+            return Rollout(True, "success", tuple(taken))
+        if info.get("plan_failed"):
+            return Rollout(False, f"no motion ({info['plan_failed']})", tuple(taken))
+        if terminated or truncated:
+            break
+    return Rollout(False, "task not done after the last action", tuple(taken))

@@ -1,0 +1,53 @@
+"""Arrows point one way: types <- geometry <- demos <- networks <- policy <- evaluation <- cli."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+SOURCE = Path(__file__).parents[1] / "src" / "imop"
+BASE = {"types", "errors", "files"}
+ALLOWED = {
+    "errors": set(),
+    "files": set(),
+    "types": {"errors"},
+    "geometry": BASE,
+    "demos": BASE | {"geometry"},
+    "networks": BASE | {"geometry", "demos"},
+    "policy": BASE | {"geometry", "demos", "networks"},
+    "sim": BASE | {"geometry"},
+    "tasks": BASE | {"geometry", "sim"},
+    "evaluation": BASE | {"geometry", "demos", "networks", "policy", "sim", "tasks"},
+}
+
+
+def imports(path):
+    for node in ast.walk(ast.parse(path.read_text())):
+        names = []
+        if isinstance(node, ast.ImportFrom) and node.module:
+            names = [node.module] if node.module != "imop" else [f"imop.{a.name}" for a in node.names]
+        elif isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        yield from (name.split(".")[1] for name in names if name.startswith("imop."))
+
+
+@pytest.mark.parametrize("path", sorted(SOURCE.rglob("*.py")), ids=lambda p: str(p.relative_to(SOURCE)))
+def test_imports_follow_the_arrows(path):
+    package = path.relative_to(SOURCE).parts[0].removesuffix(".py")
+    if package in ("__init__", "cli"):
+        return
+    forbidden = set(imports(path)) - ALLOWED[package] - {package}
+    assert not forbidden, f"{path} imports {forbidden}"
+
+
+def test_nobody_imports_the_command_line():
+    assert not [p for p in SOURCE.rglob("*.py") if "cli" in set(imports(p))]
+
+
+@pytest.mark.parametrize("package", ["policy", "networks"])
+def test_policies_name_no_task_and_no_privileged_field(package):
+    words = ("open_drawer", "stack_cubes", "lid_off_pot", "rubbish_in_bin", "instance_ids", "instance_names")
+    words += ("object_name", "T_world_object", "joint_velocities", ".task", ".ids")
+    for path in (SOURCE / package).rglob("*.py"):
+        found = [word for word in words if word in path.read_text()]
+        assert not found, f"{path}: {found}"
