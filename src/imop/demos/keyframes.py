@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from imop.errors import InvalidInput
+from imop.geometry.se3 import rotation_distance, translation_distance
 from imop.types import BoolArray, FloatArray, as_array
 
 STOP_BUFFER = 4
@@ -50,3 +52,116 @@ def published_keyframes(
     if len(keyframes) > 1 and keyframes[-2] == keyframes[-1] - 1:
         keyframes.pop(-2)
     return keyframes
+
+
+def pose_keyframes(
+    T_world_gripper: FloatArray,
+    gripper_opening: FloatArray,
+    times: FloatArray,
+    *,
+    window: float = 0.1,
+    at_rest: tuple[float, float] = (0.03, 0.2),
+    apart: tuple[float, float] = (0.01, 0.1),
+    opening_change: float = 0.1,
+) -> list[int]:
+    """A rule for recordings without joint velocities: from where the gripper was, and when.
+
+    The gripper rests in a frame if its displacement over a `window` around that frame is slower than
+    `at_rest`. A stretch of rest gives one keyframe, its slowest frame. A change of the opening gives one, the
+    frame where the fingers have settled; it stands for the rest around it, because arms stand while
+    grippers move. The last frame is one. Of consecutive keyframes whose poses are not `apart`, only a
+    change of the opening counts, or else the last of them if the episode ends there.
+
+    Args:
+        T_world_gripper: (n, 4, 4).
+        gripper_opening: (n,) 0 closed .. 1 open; measured, noise well below `opening_change` does no harm.
+        times: (n,) seconds, strictly increasing; np.arange(n) * dt for a fixed rate.
+        window: seconds.
+        at_rest: metres per second and radians per second.
+        apart: metres and radians.
+        opening_change: fraction of the stroke.
+
+    Returns:
+        Increasing frame numbers, none of them 0; empty for fewer than two frames.
+
+    Raises:
+        InvalidInput: if the lengths differ or the times do not increase.
+    """
+    T = as_array("T_world_gripper", T_world_gripper, (None, 4, 4))
+    n = len(T)
+    opening = as_array("gripper_opening", gripper_opening, (n,))
+    t = as_array("times", times, (n,))
+    if not np.all(np.diff(t) > 0):
+        raise InvalidInput(
+            "times", "not strictly increasing", "seconds, every frame later than the one before"
+        )
+    if n < 2:
+        return []
+    before, after = _window(t, window)
+    rest = _rests(T, t, before, after, at_rest)
+    changes = _opening_changes(opening, t, window, opening_change)
+    keyframes = [0]
+    for i in sorted({*changes.values(), *_outside(rest, changes), n - 1}):
+        nothing_new = not _apart(T[keyframes[-1]], T[i], apart)
+        if nothing_new and i == n - 1 and len(keyframes) > 1:
+            keyframes.pop()
+        elif nothing_new and i != n - 1 and i not in changes.values():
+            continue
+        keyframes.append(i)
+    return keyframes[1:]
+
+
+def _window(t: FloatArray, window: float) -> tuple[list[int], list[int]]:
+    """First and last frame of the window around every frame; at least its neighbours, where it has any."""
+    frames = np.arange(len(t))
+    # Half a microsecond absorbs rounding: at a fixed rate every window then has equally many frames.
+    before = np.searchsorted(t, t - window / 2 - 5e-7)
+    after = np.searchsorted(t, t + window / 2 + 5e-7, side="right") - 1
+    before = np.maximum(np.minimum(before, frames - 1), 0)
+    after = np.minimum(np.maximum(after, frames + 1), len(t) - 1)
+    return before.tolist(), after.tolist()
+
+
+def _rests(
+    T: FloatArray, t: FloatArray, before: list[int], after: list[int], at_rest: tuple[float, float]
+) -> dict[int, range]:
+    """Slowest frame of every stretch of rest -> the stretch."""
+    seconds = t[after] - t[before]
+    speed = np.maximum(
+        translation_distance(T[before], T[after]) / seconds / at_rest[0],
+        rotation_distance(T[before], T[after]) / seconds / at_rest[1],
+    )
+    # A stretch ends only at twice the speed that makes it one, so that noise does not cut it into several.
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], speed < 2, [False]]).astype(np.int8)))
+    stretches = [range(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+    slowest = {s[int(np.argmin(speed[s.start : s.stop]))]: s for s in stretches}
+    return {i: s for i, s in slowest.items() if speed[i] < 1}
+
+
+def _opening_changes(opening: FloatArray, t: FloatArray, window: float, change: float) -> dict[int, int]:
+    """Frame where the fingers left their former opening -> frame where they settled at another one."""
+    changes: dict[int, int] = {}
+    later = np.minimum(np.searchsorted(t, t + window), len(t) - 1)
+    level, i = opening[0], 0
+    while i < len(opening):
+        if abs(opening[i] - level) > change:
+            start = i
+            while i < len(opening) - 1 and abs(opening[later[i]] - opening[i]) > change / 2:
+                i += 1
+            changes[start] = i
+            level = opening[i]
+        i += 1
+    return changes
+
+
+def _outside(rests: dict[int, range], changes: dict[int, int]) -> list[int]:
+    """The rests that no change of the opening touches."""
+    return [
+        slowest
+        for slowest, stretch in rests.items()
+        if not any(start <= stretch.stop and stretch.start <= end + 1 for start, end in changes.items())
+    ]
+
+
+def _apart(T_a: FloatArray, T_b: FloatArray, apart: tuple[float, float]) -> bool:
+    return bool(translation_distance(T_a, T_b) > apart[0] or rotation_distance(T_a, T_b) > apart[1])
