@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from imop.errors import InvalidInput
 from imop.geometry import se3
-from imop.sim.robot import PANDA_HOME_Q, T_WORLD_BASE, panda_spec
+from imop.sim.robot import FINGER_STROKE, PANDA_HOME_Q, T_WORLD_BASE, panda_spec
 from imop.types import FloatArray, IntArray, as_pose
 
 TABLE_HEIGHT = 0.75
@@ -21,7 +21,7 @@ TABLE_UPPER = (1.1, 0.55)
 ROBOT = "panda/"
 GRASP = "grasp:"
 """Welds of this prefix, each followed by the body's name, say what the gripper may attach."""
-FINGER_STROKE = 0.04
+ATTACH_VOLUME = f"{ROBOT}attach_volume"
 TIME_STEP = 0.002
 CONTACT_SOLREF = (0.004, 1.0)
 DEFAULT_SOLREF = (0.02, 1.0)
@@ -63,7 +63,26 @@ def scene_spec() -> Any:
         pos=T_WORLD_BASE[:3, 3], quat=Rotation.from_matrix(T_WORLD_BASE[:3, :3]).as_quat(scalar_first=True)
     )
     spec.attach(panda_spec(), prefix=ROBOT, frame=base)
+    _add_attach_volume(spec)
     return spec
+
+
+def _add_attach_volume(spec: Any) -> None:
+    """An invisible box between the open fingers, RLBench's attach sensor without what lies outside them."""
+    hand, tip = spec.body(f"{ROBOT}hand"), spec.site(f"{ROBOT}tip")
+    T_hand_tip = se3.from_pose7(np.array([*tip.pos, *np.roll(tip.quat, -1)]))
+    hand.add_geom(
+        name=ATTACH_VOLUME,
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        pos=(T_hand_tip @ (0, 0, -0.0235, 1))[:3],
+        quat=tip.quat,
+        size=[0.01, FINGER_STROKE, 0.0225],
+        rgba=[0, 0, 0, 0],
+        group=5,
+        contype=0,
+        conaffinity=0,
+        mass=0,
+    )
 
 
 def allow_grasp(spec: Any, body: str) -> None:

@@ -1,0 +1,105 @@
+"""Inverse kinematics of the Panda: all solutions for one pose, and the continuous branch along a line."""
+
+import frankik
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from imop.geometry import se3
+from imop.sim.robot import JOINT_LOWER, JOINT_UPPER, T_FLANGE_TIP, T_WORLD_BASE, link_poses
+from imop.types import FloatArray, as_pose
+
+_SAMPLES, _INTERVAL_DEGREES = 120, 330
+_POSITION_TOLERANCE, _ROTATION_TOLERANCE = 1e-5, 1e-4
+_NEWTON_STEPS, _DAMPING = 12, 1e-3
+
+
+def _fixed_parts() -> FloatArray:
+    """(8, 4, 4): from each link's frame to the next joint's, the last from link 7 to the flange."""
+    at_zero = link_poses(np.zeros(7))
+    before = np.concatenate([np.eye(4)[None], at_zero[:-1]])
+    return se3.invert(before) @ at_zero
+
+
+_FIXED = _fixed_parts()
+
+
+def inverse_kinematics(
+    T_world_gripper: FloatArray, q_reference: FloatArray, limit: int | None = None
+) -> FloatArray:
+    """Arm configurations that put the tip at a pose, nearest to a reference first.
+
+    Args:
+        T_world_gripper: (4, 4) pose of the tip.
+        q_reference: (7,) radians.
+        limit: keep at most so many.
+
+    Returns:
+        (n, 7) radians within the joint limits; n = 0 if the pose cannot be reached.
+    """
+    T = as_pose("T_world_gripper", T_world_gripper)
+    # frankik solves for the flange, although its own forward kinematics gives a point of the hand.
+    T_base_flange = se3.invert(T_WORLD_BASE) @ T @ se3.invert(T_FLANGE_TIP)
+    found = frankik.ik_sample_q7(
+        T_base_flange, q_reference, sample_size=_SAMPLES, sample_interval=_INTERVAL_DEGREES, full_ik=True
+    )
+    if not found:
+        return np.empty((0, 7))
+    q = np.unique(np.round(np.asarray(found, dtype=np.float64), 9), axis=0)
+    q = q[np.all(np.isfinite(q) & (q >= JOINT_LOWER) & (q <= JOINT_UPPER), axis=1)]
+    nearest: FloatArray = q[np.argsort(np.linalg.norm(q - q_reference, axis=1), kind="stable")][:limit]
+    return nearest
+
+
+def line(T_from: FloatArray, T_to: FloatArray, steps: int) -> FloatArray:
+    """(steps, 4, 4) poses at fractions 1/steps .. 1 of the way, straight and evenly turning."""
+    fractions = np.arange(1, steps + 1)[:, None] / steps
+    turn = Rotation.from_matrix(T_from[:3, :3].T @ T_to[:3, :3]).as_rotvec()
+    R = T_from[:3, :3] @ Rotation.from_rotvec(fractions * turn).as_matrix()
+    return se3.make(R, T_from[:3, 3] + fractions * (T_to[:3, 3] - T_from[:3, 3]))
+
+
+def follow(poses: FloatArray, q_start: FloatArray) -> FloatArray | None:
+    """The continuous branch of solutions that starts at `q_start`.
+
+    Args:
+        poses: (n, 4, 4) close-by tip poses, to be reached one after another.
+        q_start: (7,) radians, near the first pose.
+
+    Returns:
+        (n, 7) radians, or None where the branch leaves the joint limits or ends.
+    """
+    rows, q = [], np.asarray(q_start, dtype=np.float64)
+    for T in poses:
+        next_q = _newton(q, T)
+        if next_q is None:
+            return None
+        rows.append(next_q)
+        q = next_q
+    return np.stack(rows) if rows else np.empty((0, 7))
+
+
+def _newton(q: FloatArray, T: FloatArray) -> FloatArray | None:
+    for _ in range(_NEWTON_STEPS):
+        T_q, J = tip_and_jacobian(q)
+        error = np.concatenate(
+            [T[:3, 3] - T_q[:3, 3], Rotation.from_matrix(T[:3, :3] @ T_q[:3, :3].T).as_rotvec()]
+        )
+        if np.abs(error[:3]).max() < _POSITION_TOLERANCE and np.abs(error[3:]).max() < _ROTATION_TOLERANCE:
+            return q
+        step = J.T @ np.linalg.solve(J @ J.T + _DAMPING**2 * np.eye(6), error)
+        q = np.clip(q + np.clip(step, -0.2, 0.2), JOINT_LOWER, JOINT_UPPER)
+    return None
+
+
+def tip_and_jacobian(q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Tip pose (4, 4) and its Jacobian (6, 7): linear, then angular velocity, world frame."""
+    T, axes, origins = np.eye(4), [], []
+    for fixed, angle in zip(_FIXED[:7], q, strict=True):
+        c, s = np.cos(angle), np.sin(angle)
+        T = T @ fixed
+        T[:3, :2] = np.stack([c * T[:3, 0] + s * T[:3, 1], c * T[:3, 1] - s * T[:3, 0]], axis=1)
+        axes.append(T[:3, 2])
+        origins.append(T[:3, 3])
+    T = T @ _FIXED[7] @ T_FLANGE_TIP
+    z, arms = np.stack(axes), T[:3, 3] - np.stack(origins)
+    return T, np.concatenate([np.cross(z, arms), z], axis=1).T
