@@ -5,7 +5,7 @@ positive focal lengths, joint 4 gets Franka's zero.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from imop.demos import unpickle
 from imop.demos.images import read_depth, read_ids, read_rgb
 from imop.demos.keyframes import published_keyframes
+from imop.demos.store import DemonstrationStore
 from imop.errors import CorruptData, InvalidInput
 from imop.geometry.se3 import from_pose7
 from imop.types import Action, CameraView, Demonstration, FloatArray, Keyframe, Observation, as_array
@@ -233,3 +234,32 @@ def _task(folder: Path) -> str:
 def _natural(path: Path) -> list[tuple[int, str]]:
     parts = re.split(r"(\d+)", path.as_posix())
     return [(int(part), "") if part.isdigit() else (-1, part) for part in parts]
+
+
+def import_rlbench(
+    source: Path | str,
+    out: Path | str,
+    cameras: Sequence[str] = POLICY_CAMERAS,
+    track: Callable[[Sequence[Path]], Iterable[Path]] = iter,
+) -> int:
+    """Copy all episodes below `source` into the store `out`, which is made if it does not exist.
+
+    Args:
+        source: anything that `episodes` accepts.
+        out: a new folder, or an existing store, which is appended to.
+        cameras: as in `read_episode`.
+        track: wraps the sequence of episode folders, to show progress.
+
+    Returns:
+        How many episodes were imported. If one cannot be read, those before it are in the store.
+
+    Raises:
+        InvalidInput: if `out` exists and is not a store, or there is no episode below `source`.
+        CorruptData: as `read_episode`.
+    """
+    folders = episodes(source)
+    exists = Path(out).is_dir() and any(Path(out).iterdir())
+    store = DemonstrationStore.open(out) if exists else DemonstrationStore.create(out)
+    for folder in track(folders):
+        store.append(read_episode(folder, cameras))
+    return len(folders)

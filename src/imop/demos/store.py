@@ -1,0 +1,224 @@
+"""Demonstrations in a Zarr v3 store: one group per episode, written once, never changed.
+
+An episode is written under a hidden name and renamed when it is complete, so a writer that dies at any
+moment leaves nothing half-visible, and several processes may append to one store.
+"""
+
+import os
+import re
+import shutil
+import socket
+import uuid
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import zarr
+from numpy.typing import NDArray
+from zarr.codecs import BloscCodec, Crc32cCodec
+
+from imop.demos import episode
+from imop.errors import CorruptData, InvalidInput
+from imop.types import Demonstration
+
+FORMAT = "imop demonstrations"
+VERSION = 1
+
+_EPISODE = re.compile(r"episode_(\d{6,})$")
+_UNFINISHED = re.compile(r"\.writing-(?P<host>.+)-(?P<pid>\d+)-[0-9a-f]+$")
+
+
+class DemonstrationStore:
+    """A growing sequence of demonstrations on disk.
+
+    Make one with `create` or `open`. A store at an fsspec URL can be read, not appended to.
+    """
+
+    def __init__(self, path: Path | str, group: zarr.Group):
+        self.path, self._group = path, group
+
+    @classmethod
+    def create(cls, path: Path | str) -> "DemonstrationStore":
+        """Make an empty store in a folder that does not exist or is empty.
+
+        Raises:
+            InvalidInput: if there is something already, or `path` is a URL.
+        """
+        folder = _local(path)
+        if folder is None:
+            raise InvalidInput("path", f"{path} is a URL", "a local folder; copy the finished store")
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise InvalidInput("path", f"{folder} already exists", "a new or empty folder")
+        zarr.create_group(folder, attributes={"format": FORMAT, "version": VERSION})
+        return cls.open(folder)
+
+    @classmethod
+    def open(cls, path: Path | str) -> "DemonstrationStore":
+        """Open a store; checks its version, that no episode is missing, and the shapes of all arrays.
+
+        Raises:
+            InvalidInput: if there is no store at `path`.
+            CorruptData: if it was written by a later version, or is not complete.
+        """
+        accepted = "the path of a store of demonstrations (imop collect and imop import make them)"
+        try:
+            group = zarr.open_group(_location(path), mode="r")
+        except (FileNotFoundError, NotADirectoryError, zarr.errors.NodeNotFoundError):
+            raise InvalidInput("path", f"there is no store at {path}", accepted) from None
+        except Exception as error:  # damaged JSON, unknown URL schemes, permissions, networks
+            raise CorruptData(path, f"the store cannot be opened ({error})") from error
+        if group.attrs.get("format") != FORMAT:
+            raise InvalidInput("path", f"the Zarr group at {path} holds no demonstrations", accepted)
+        if group.attrs.get("version") != VERSION:
+            problem = f"format version {group.attrs.get('version')}, but this imop reads version {VERSION}"
+            raise CorruptData(path, problem, "install the imop that wrote it")
+        store = cls(path, group)
+        for index in range(len(store)):
+            store._verified(index)
+        return store
+
+    def __len__(self) -> int:
+        return len(self._names())
+
+    def __iter__(self) -> Iterator[Demonstration]:
+        return (self[index] for index in range(len(self)))
+
+    def __getitem__(self, index: int) -> Demonstration:
+        """The demonstration appended as number `index`; negative numbers count from the end.
+
+        Raises:
+            IndexError: if there are not so many.
+            CorruptData: if it cannot be read back as it was written.
+        """
+        n = len(self)
+        if not -n <= index < n:
+            raise IndexError(f"episode {index} of a store of {n}")
+        group, arrays = self._verified(index % n)
+        where = f"{self.path}/{group.basename}"
+        stacked = {name: _read(f"{where}/{name}", array) for name, array in arrays.items()}
+        try:
+            return episode.unpack(dict(group.attrs), stacked)
+        except (KeyError, IndexError, TypeError, ValueError) as error:  # InvalidInput is a ValueError
+            raise CorruptData(where, f"the parts do not fit together ({error})") from error
+
+    def append(self, demonstration: Demonstration) -> int:
+        """Write `demonstration` behind the others; also removes what writers that died have left.
+
+        Returns:
+            The number of the new episode.
+
+        Raises:
+            InvalidInput: if the store is at a URL, or the demonstration holds predicted actions.
+        """
+        folder = _local(self.path)
+        if folder is None:
+            raise InvalidInput("path", f"{self.path} is a URL", "a local store; copy it when it is finished")
+        attributes, arrays = episode.pack(demonstration)
+        _remove_leftovers(folder)
+        unfinished = folder / f".writing-{socket.gethostname()}-{os.getpid()}-{uuid.uuid4().hex}"
+        try:
+            _write(unfinished, attributes, arrays)
+            return _publish(unfinished, folder, len(self))
+        except BaseException:
+            shutil.rmtree(unfinished, ignore_errors=True)
+            raise
+
+    def _names(self) -> list[str]:
+        folder = _local(self.path)
+        names = [p.name for p in folder.iterdir()] if folder else list(self._group.group_keys())
+        found = sorted((int(match[1]), name) for name in names if (match := _EPISODE.match(name)))
+        for expected, (number, _) in enumerate(found):
+            if number != expected:
+                remedy = "restore it, or rename the later ones so that none is missing"
+                raise CorruptData(self.path, f"episode_{expected:06d} is missing", remedy)
+        return [name for _, name in found]
+
+    def _verified(self, index: int) -> tuple[zarr.Group, "dict[str, zarr.Array[Any]]"]:
+        """The episode's group and arrays, if the arrays have the shapes and types that were written."""
+        where = f"{self.path}/{_name(index)}"
+        try:
+            group = zarr.open_group(self._group.store, path=_name(index), mode="r")
+            arrays = dict(group.arrays())
+            actual = {name: [list(a.shape), a.dtype.name] for name, a in arrays.items()}
+            declared = dict(cast(Any, group.attrs["arrays"]))
+        except Exception as error:  # damaged JSON fails in many ways
+            raise CorruptData(where, f"the episode's description is unreadable ({error!r})") from error
+        for name in sorted({*declared, *actual}):
+            if declared.get(name) != actual.get(name):
+                problem = f"is {actual.get(name, 'missing')}, was written as {declared.get(name, 'nothing')}"
+                raise CorruptData(f"{where}/{name}", problem)
+        return group, arrays
+
+
+def _read(where: str, array: "zarr.Array[Any]") -> NDArray[Any]:
+    try:
+        # Zarr reads a chunk whose file is gone as zeros.
+        if array.nchunks_initialized != array.nchunks:
+            raise FileNotFoundError("a file of the array is missing")
+        return np.asarray(array[...])
+    except Exception as error:  # each codec has its own ways to say that bytes are missing or wrong
+        raise CorruptData(where, f"the data cannot be read ({error})") from error
+
+
+def _name(index: int) -> str:
+    return f"episode_{index:06d}"
+
+
+def _local(path: Path | str) -> Path | None:
+    """The folder, or None if `path` is a URL."""
+    return None if "://" in str(path) else Path(path)
+
+
+def _location(path: Path | str) -> Path | str:
+    return _local(path) or str(path)
+
+
+def _write(folder: Path, attributes: episode.Attributes, arrays: episode.Arrays) -> None:
+    group = zarr.create_group(folder, attributes=attributes)
+    for name, array in arrays.items():
+        is_image = array.nbytes > 2**16
+        group.create_array(
+            name,
+            data=array,
+            # One image can be read without the others, and yet they are one file.
+            chunks=(1, *array.shape[1:]) if is_image else array.shape,
+            shards=array.shape if is_image else None,
+            chunk_key_encoding={"name": "default", "separator": "."},
+            compressors=[BloscCodec(cname="zstd", clevel=5, shuffle="shuffle"), Crc32cCodec()],
+            config={"write_empty_chunks": True},
+        )
+    for file in folder.rglob("*"):
+        if file.is_file():
+            with file.open("rb") as stream:
+                os.fsync(stream.fileno())
+
+
+def _publish(unfinished: Path, folder: Path, index: int) -> int:
+    """Give the finished episode the next free number, also if other processes append at the same time."""
+    while True:
+        target = folder / _name(index)
+        try:
+            os.rename(unfinished, target)
+            return index
+        except OSError:
+            if not target.exists():
+                raise
+            index += 1
+
+
+def _remove_leftovers(folder: Path) -> None:
+    for path in folder.iterdir():
+        match = _UNFINISHED.match(path.name)
+        if match and match["host"] == socket.gethostname() and not _alive(int(match["pid"])):
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def _alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True
