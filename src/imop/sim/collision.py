@@ -1,6 +1,7 @@
 """Does an arm configuration touch anything? Asked of a copy of the model, so the world stays as it is."""
 
 import copy
+import itertools
 from typing import Any
 
 import mujoco
@@ -14,6 +15,8 @@ CLEARANCE = 0.004
 """Metres kept from everything that is not already nearer at the start or at the goal."""
 RESOLUTION = 0.03
 """Largest distance (2-norm, radians) between checked configurations of a motion."""
+GOAL_DEPTH = 0.002
+"""Metres that the gripper or what it holds may press into something at the goal: goals are contacts."""
 _START_SLACK = 0.001
 
 
@@ -21,7 +24,7 @@ class CollisionChecker:
     """Checks configurations of the arm, with whatever the hand holds, in the scene as it is now.
 
     Two bodies may not come nearer than `CLEARANCE`; those already nearer at the start or at the goal may not
-    touch; those that touch at the start may not sink deeper into each other.
+    touch; those that touch there may not sink deeper into each other.
 
     Args:
         world: the scene; it is copied.
@@ -46,10 +49,10 @@ class CollisionChecker:
         self._threshold = np.full((self._model.nbody, self._model.nbody), CLEARANCE)
         self._threshold[np.ix_(held, self._gripper | held)] = -np.inf
         self._threshold[np.ix_(self._gripper, held)] = -np.inf
-        self._relax(world.robot_q, self._threshold > -np.inf, at_start=True)
+        self._relax(world.robot_q, np.ones_like(self._threshold, dtype=np.bool_), -np.inf, _START_SLACK)
 
     def _keep_only_pairs_of(self, moving: BoolArray, others: bool, robot: BoolArray) -> None:
-        """Collide moving bodies with all (or only the robot with itself); never still bodies with each other."""
+        """Collide moving bodies with all, or the robot with itself only; never still bodies with each other."""
         m = self._model
         bodies = m.geom_bodyid
         solid = (m.geom_contype != 0) | (m.geom_conaffinity != 0)
@@ -73,16 +76,17 @@ class CollisionChecker:
         pairs = self._model.geom_bodyid[d.contact.geom]
         return pairs[:, 0], pairs[:, 1], np.asarray(d.contact.dist)
 
-    def _relax(self, q: FloatArray, where: BoolArray, at_start: bool) -> None:
+    def _relax(self, q: FloatArray, where: BoolArray, deepest: float, slack: float) -> None:
+        """Allow the distances that pairs selected by `where` (bodies, bodies) have at `q`, if not too deep."""
         for a, b, distance in zip(*self._near(q), strict=True):
-            if where[a, b]:
-                allowed = distance - _START_SLACK if at_start and distance <= 0 else 0.0
-                self._threshold[a, b] = self._threshold[b, a] = min(self._threshold[a, b], allowed)
+            if where[a, b] and distance >= deepest:
+                allowed = min(self._threshold[a, b], 0.0, distance - slack)
+                self._threshold[a, b] = self._threshold[b, a] = allowed
 
     def expect_goal(self, q_goal: FloatArray) -> None:
-        """Let the gripper and what it holds come nearer than the clearance to what is near at the goal."""
+        """Let the gripper and what it holds come as near to other things as they are at the goal."""
         moving = self._gripper | self._held.members
-        self._relax(q_goal, moving[:, None] | moving[None, :], at_start=False)
+        self._relax(q_goal, moving[:, None] | moving[None, :], -GOAL_DEPTH, 1e-5)
 
     def valid(self, q: FloatArray) -> bool:
         """Whether the arm at `q` (7,) keeps its distances."""
@@ -119,7 +123,7 @@ class _HeldBodies:
 def densify(q: FloatArray, resolution: float) -> FloatArray:
     """Rows of `q` (n, 7) with rows put between them so that none are farther apart than `resolution`."""
     rows = [q[:1]]
-    for a, b in zip(q[:-1], q[1:], strict=True):
+    for a, b in itertools.pairwise(q):
         n = max(1, int(np.ceil(np.linalg.norm(b - a) / resolution)))
         rows.append(a + np.arange(1, n + 1)[:, None] / n * (b - a))
     return np.concatenate(rows)

@@ -68,13 +68,12 @@ def follow(poses: FloatArray, q_start: FloatArray) -> FloatArray | None:
     Returns:
         (n, 7) radians, or None where the branch leaves the joint limits or ends.
     """
-    rows, q = [], np.asarray(q_start, dtype=np.float64)
+    rows, q = [], q_start
     for T in poses:
-        next_q = _newton(q, T)
-        if next_q is None:
+        solution = _newton(q, T)
+        if solution is None:
             return None
-        rows.append(next_q)
-        q = next_q
+        rows.append(q := solution)
     return np.stack(rows) if rows else np.empty((0, 7))
 
 
@@ -86,8 +85,8 @@ def _newton(q: FloatArray, T: FloatArray) -> FloatArray | None:
         )
         if np.abs(error[:3]).max() < _POSITION_TOLERANCE and np.abs(error[3:]).max() < _ROTATION_TOLERANCE:
             return q
-        step = J.T @ np.linalg.solve(J @ J.T + _DAMPING**2 * np.eye(6), error)
-        q = np.clip(q + np.clip(step, -0.2, 0.2), JOINT_LOWER, JOINT_UPPER)
+        step: FloatArray = J.T @ np.linalg.solve(J @ J.T + _DAMPING**2 * np.eye(6), error)
+        q = np.asarray(np.clip(q + np.clip(step, -0.2, 0.2), JOINT_LOWER, JOINT_UPPER), dtype=np.float64)
     return None
 
 

@@ -37,7 +37,7 @@ _MAX_JOINT_STEP = 0.25
 _MAX_CHECKS = 12_000
 _MAX_GOALS = 8
 _GOAL_DISTANCE = 0.3
-_SPLINE_STEP = 0.08
+_SPLINE_STEPS = (0.08, 0.02)
 
 util.noOutputHandler()
 logging.getLogger("toppra").setLevel(logging.ERROR)
@@ -115,7 +115,7 @@ class Planner:
     def _straight(self, T: FloatArray, q_start: FloatArray, checker: CollisionChecker) -> FloatArray | None:
         T_start = self._world.T_world_gripper
         distance, turn = se3.translation_distance(T_start, T), se3.rotation_distance(T_start, T)
-        steps = int(np.ceil(max(distance / _LINE_STEP, turn / _LINE_TURN, 1.0)))
+        steps = max(1, int(np.ceil(distance / _LINE_STEP)), int(np.ceil(turn / _LINE_TURN)))
         rows = follow(line(T_start, T, steps), q_start)
         if rows is None:
             return None
@@ -205,16 +205,19 @@ def _timed(path: FloatArray, checker: CollisionChecker) -> tuple[FloatArray, Flo
     """Times, positions and velocities along `path`, smoothed where that stays valid.
 
     Raises:
-        PlanFailed: "no_timing" if no velocity profile exists.
+        PlanFailed: "no_timing" if no velocity profile exists, "in_motion_collision" if none stays valid.
     """
     if len(path) == 2 and np.abs(path[1] - path[0]).max() < 1e-4:
         return np.array([0.0, PERIOD]), path, np.zeros((2, 7))
-    timed = _profile(densify(path, _SPLINE_STEP))
-    if checker.valid_motion(timed[1][::2]):
-        return timed
+    for step in _SPLINE_STEPS:
+        timed = _profile(densify(path, step))
+        if checker.valid_motion(timed[1][::2]):
+            return timed
     # Rounded corners touch something: stop at each corner instead.
-    parts = [_profile(densify(segment, 10.0)) for segment in zip(path[:-1], path[1:], strict=True)]
-    return _joined(parts)
+    timed = _joined([_profile(path[i : i + 2]) for i in range(len(path) - 1)])
+    if not checker.valid_motion(timed[1]):
+        raise PlanFailed("in_motion_collision", "the timed motion leaves the free path")
+    return timed
 
 
 def _profile(rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
