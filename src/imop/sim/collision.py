@@ -52,7 +52,7 @@ class CollisionChecker:
         self._relax(world.robot_q, np.ones_like(self._threshold, dtype=np.bool_), -np.inf, _START_SLACK)
 
     def _keep_only_pairs_of(self, moving: BoolArray, others: bool, robot: BoolArray) -> None:
-        """Collide moving bodies with all, or the robot with itself only; never still bodies with each other."""
+        """Collide moving bodies with all, or the robot with itself only, and never others with others."""
         m = self._model
         bodies = m.geom_bodyid
         solid = (m.geom_contype != 0) | (m.geom_conaffinity != 0)
@@ -77,7 +77,7 @@ class CollisionChecker:
         return pairs[:, 0], pairs[:, 1], np.asarray(d.contact.dist)
 
     def _relax(self, q: FloatArray, where: BoolArray, deepest: float, slack: float) -> None:
-        """Allow the distances that pairs selected by `where` (bodies, bodies) have at `q`, if not too deep."""
+        """Allow the distances that the pairs in `where` (bodies, bodies) have at `q`, if not too deep."""
         for a, b, distance in zip(*self._near(q), strict=True):
             if where[a, b] and distance >= deepest:
                 allowed = min(self._threshold[a, b], 0.0, distance - slack)
@@ -96,6 +96,13 @@ class CollisionChecker:
     def valid_motion(self, q: FloatArray) -> bool:
         """Whether all the straight joint motions between successive rows of `q` (n, 7) are valid."""
         return all(self.valid(row) for row in densify(q, RESOLUTION))
+
+    def after_search(self) -> "CollisionChecker":
+        """The same check with half the clearance, for motions whose coarse check has passed."""
+        finer = copy.copy(self)
+        half = np.where(self._threshold > 0, self._threshold / 2, self._threshold - _START_SLACK / 2)
+        finer._threshold = half
+        return finer
 
 
 class _HeldBodies:

@@ -44,7 +44,7 @@ def inverse_kinematics(
     )
     if not found:
         return np.empty((0, 7))
-    q = np.unique(np.round(np.asarray(found, dtype=np.float64), 9), axis=0)
+    q: FloatArray = np.unique(np.round(np.asarray(found, dtype=np.float64), 9), axis=0)
     q = q[np.all(np.isfinite(q) & (q >= JOINT_LOWER) & (q <= JOINT_UPPER), axis=1)]
     nearest: FloatArray = q[np.argsort(np.linalg.norm(q - q_reference, axis=1), kind="stable")][:limit]
     return nearest
@@ -86,7 +86,7 @@ def _newton(q: FloatArray, T: FloatArray) -> FloatArray | None:
         if np.abs(error[:3]).max() < _POSITION_TOLERANCE and np.abs(error[3:]).max() < _ROTATION_TOLERANCE:
             return q
         step: FloatArray = J.T @ np.linalg.solve(J @ J.T + _DAMPING**2 * np.eye(6), error)
-        q = np.asarray(np.clip(q + np.clip(step, -0.2, 0.2), JOINT_LOWER, JOINT_UPPER), dtype=np.float64)
+        q = np.clip(q + np.clip(step, -0.2, 0.2), JOINT_LOWER, JOINT_UPPER)
     return None
 
 

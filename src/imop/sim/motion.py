@@ -37,10 +37,15 @@ _MAX_JOINT_STEP = 0.25
 _MAX_CHECKS = 12_000
 _MAX_GOALS = 8
 _GOAL_DISTANCE = 0.3
+_ATTEMPTS = 3
 _SPLINE_STEPS = (0.08, 0.02)
 
 util.noOutputHandler()
 logging.getLogger("toppra").setLevel(logging.ERROR)
+
+
+TimedPath = tuple[FloatArray, FloatArray, FloatArray]
+"""Times (n,), positions (n, 7), velocities (n, 7)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,13 +109,13 @@ class Planner:
         checker = CollisionChecker(self._world, allow_collisions)
         checker.expect_goal(goals[0])
         path = self._straight(T, q_start, checker)
-        straight = path is not None
-        if path is None:
-            if linear:
-                raise PlanFailed("no_straight_path")
-            path = self._search(q_start, _valid_goals(goals, checker), checker, started + self._seconds)
-        timed = _timed(path, checker)
-        return Trajectory(*timed, straight=straight, seconds=time.monotonic() - started)
+        if path is not None:
+            timed = _timed(path, checker.after_search())
+        elif linear:
+            raise PlanFailed("no_straight_path")
+        else:
+            timed = self._search(q_start, _valid_goals(goals, checker), checker, started + self._seconds)
+        return Trajectory(*timed, straight=path is not None, seconds=time.monotonic() - started)
 
     def _straight(self, T: FloatArray, q_start: FloatArray, checker: CollisionChecker) -> FloatArray | None:
         T_start = self._world.T_world_gripper
@@ -126,17 +131,23 @@ class Planner:
 
     def _search(
         self, q_start: FloatArray, goals: FloatArray, checker: CollisionChecker, deadline: float
-    ) -> FloatArray:
+    ) -> TimedPath:
         if len(goals) == 0:
             raise PlanFailed("goal_in_collision", "every configuration with this tip pose touches something")
         for goal in goals:
             direct = np.stack([q_start, goal])
             if checker.valid_motion(direct):
-                return direct
-        path = _rrt_connect(q_start, goals, checker, self._seed, deadline)
-        if path is None:
-            raise PlanFailed("no_path", f"none found with {checker.checks} collision checks")
-        return path
+                return _timed(direct, checker.after_search())
+        failure = PlanFailed("no_path")
+        for attempt in range(_ATTEMPTS):
+            path = _rrt_connect(q_start, goals, checker, _ATTEMPTS * self._seed + attempt, deadline)
+            if path is None:
+                raise PlanFailed("no_path", f"none found with {checker.checks} collision checks")
+            try:
+                return _timed(path, checker.after_search())
+            except PlanFailed as error:
+                failure = error
+        raise failure
 
 
 def _valid_goals(goals: FloatArray, checker: CollisionChecker) -> FloatArray:
@@ -201,7 +212,7 @@ def _row(state: Any) -> FloatArray:
     return np.array([state[i] for i in range(7)])
 
 
-def _timed(path: FloatArray, checker: CollisionChecker) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _timed(path: FloatArray, checker: CollisionChecker) -> TimedPath:
     """Times, positions and velocities along `path`, smoothed where that stays valid.
 
     Raises:
@@ -220,7 +231,7 @@ def _timed(path: FloatArray, checker: CollisionChecker) -> tuple[FloatArray, Flo
     return timed
 
 
-def _profile(rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _profile(rows: FloatArray) -> TimedPath:
     lengths = np.linalg.norm(np.diff(rows, axis=0), axis=1)
     rows = rows[np.concatenate([[True], lengths > 1e-7])]
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(rows, axis=0), axis=1))])
@@ -240,9 +251,7 @@ def _profile(rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     return times, timed(times), velocities
 
 
-def _joined(
-    parts: list[tuple[FloatArray, FloatArray, FloatArray]],
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _joined(parts: list[TimedPath]) -> TimedPath:
     offsets = np.concatenate([[0.0], np.cumsum([part[0][-1] for part in parts])])
     times = [part[0][i > 0 :] + offset for i, (part, offset) in enumerate(zip(parts, offsets, strict=False))]
     rest = [[part[k][i > 0 :] for i, part in enumerate(parts)] for k in (1, 2)]
