@@ -1,0 +1,1 @@
+"""Tasks: what stands on the table, when it is done, and how an expert does it."""

@@ -1,0 +1,33 @@
+"""One step of an expert."""
+
+from dataclasses import dataclass
+
+from imop.sim.world import World
+from imop.types import FloatArray, as_pose
+
+
+@dataclass(frozen=True, eq=False)
+class Waypoint:
+    """A gripper pose in the frame of a body, and what the gripper does there.
+
+    Attributes:
+        frame: name of the body whose frame the pose is given in. It must not move before the waypoint's
+            turn, so that what is reachable at the start stays so.
+        T_frame_gripper: (4, 4).
+        gripper_open: state of the gripper after the motion.
+        allow_collisions: whether the motion may touch things.
+        linear: whether the tip has to follow a straight line.
+    """
+
+    frame: str
+    T_frame_gripper: FloatArray
+    gripper_open: bool
+    allow_collisions: bool = False
+    linear: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_frame_gripper", as_pose("T_frame_gripper", self.T_frame_gripper))
+
+    def target(self, world: World) -> FloatArray:
+        """T_world_gripper (4, 4) with the frame where it is now."""
+        return world.pose(self.frame) @ self.T_frame_gripper
