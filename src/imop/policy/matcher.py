@@ -1,0 +1,105 @@
+"""What a matcher is: it finds the region of a demonstrated step again in another scene.
+
+A matcher is asked once per demonstration to prepare its steps (find the invariant regions, compute what can
+be computed ahead) and then once per action to match a prepared step against what is seen now. Registration
+and networks stand behind the same two calls.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imop.geometry.cloud import PointCloud
+from imop.types import Action, FloatArray, Observation
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """One state as the policy works on it.
+
+    Attributes:
+        observation: the images, whose depth also says where nothing is, and the pose of the gripper.
+        cloud: the prepared cloud with normals, without the robot.
+    """
+
+    observation: Observation
+    cloud: PointCloud
+
+
+@dataclass(frozen=True, eq=False)
+class Transition:
+    """A demonstrated step (s_i, a_i, s_i').
+
+    Attributes:
+        before: the support state s_i.
+        after: the state s_i' that the action led to.
+        action: T_i and the gripper's state after it.
+    """
+
+    before: Scene
+    after: Scene
+    action: Action
+
+
+@dataclass(frozen=True, eq=False)
+class Correspondences:
+    """Weighted pairs of points, the sparse form of the paper's matrix C.
+
+    Attributes:
+        i_support: (K,) indices into the region's points.
+        i_query: (K,) indices into the query's points.
+        weight: (K,) not negative.
+    """
+
+    i_support: NDArray[np.int64]
+    i_query: NDArray[np.int64]
+    weight: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.weight)
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """One way in which the region may have moved from the demonstrated scene into the observed one.
+
+    Attributes:
+        T_query_support: (4, 4) rigid motion, world frame to world frame.
+        score: 0 .. 1, the share of the region that the observed points explain.
+        p_support: (K, 3) points of the region that found a counterpart.
+        p_query: (K, 3) the counterparts.
+    """
+
+    T_query_support: FloatArray
+    score: float
+    p_support: FloatArray
+    p_query: FloatArray
+
+
+class PreparedStep(Protocol):
+    """A demonstrated step with everything about it that does not depend on the query."""
+
+    @property
+    def region(self) -> FloatArray:
+        """(M, 3) points of the invariant region in the demonstrated scene; may be empty."""
+        ...
+
+    def match(self, query: Scene, hints: Sequence[FloatArray] = ()) -> tuple[Hypothesis, ...]:
+        """Where the region is in the query, best first; empty if it was not found.
+
+        Args:
+            query: the observed scene.
+            hints: motions (4, 4) worth trying, such as the one found for the step before.
+        """
+        ...
+
+
+class Matcher(Protocol):
+    """Finds regions and matches them."""
+
+    def prepare(self, steps: Sequence[Transition]) -> Sequence[PreparedStep]:
+        """One prepared step for each demonstrated one; called once per demonstration."""
+        ...

@@ -1,0 +1,98 @@
+"""The policy: watch a demonstration once, then act in scenes that were never seen."""
+
+import numpy as np
+
+from imop.errors import InvalidInput, NoConfidentMatch
+from imop.geometry.perception import Perception
+from imop.policy.hypotheses import confidence
+from imop.policy.matcher import Matcher, PreparedStep, Scene, Transition
+from imop.policy.router import AdvancingRouter, Router
+from imop.types import Action, Demonstration, FloatArray, Match, Observation
+
+
+class OneShotPolicy:
+    """Transfers demonstrated poses by finding each step's region again: T_j = T_query_support T_i.
+
+    Args:
+        matcher: finds the regions.
+        perception: makes clouds of observations.
+        router: chooses the demonstrated step; by default they follow each other.
+        min_confidence: below it `act` raises `NoConfidentMatch`; 0 acts always.
+    """
+
+    def __init__(
+        self,
+        matcher: Matcher,
+        perception: Perception,
+        router: Router | None = None,
+        min_confidence: float = 0.0,
+    ):
+        self._matcher = matcher
+        self._perception = perception
+        self._router = router or AdvancingRouter()
+        self._min_confidence = min_confidence
+        self._demonstrations: list[list[Transition]] = []
+        self._prepared: list[list[PreparedStep]] = []
+        self._cameras: set[str] = set()
+        self._hints: list[FloatArray] = []
+
+    def watch(self, demonstration: Demonstration) -> None:
+        """Take in a demonstration; a further call adds another one.
+
+        Raises:
+            InvalidInput: if an observation has no usable depth.
+        """
+        observations = [keyframe.observation for keyframe in demonstration.keyframes]
+        scenes = [self._scene(observation) for observation in [*observations, demonstration.final]]
+        steps = [
+            Transition(before, after, keyframe.action)
+            for before, after, keyframe in zip(scenes, scenes[1:], demonstration.keyframes, strict=False)
+        ]
+        self._cameras |= set(observations[0].views)
+        self._demonstrations.append(steps)
+        self._prepared.append(list(self._matcher.prepare(steps)))
+        self._router.watch(steps)
+
+    def reset(self) -> None:
+        """Begin a new episode."""
+        self._hints = []
+        self._router.reset()
+
+    def act(self, observation: Observation) -> Action:
+        """The action for what is seen now, with its confidence and the matched points.
+
+        Raises:
+            InvalidInput: if nothing was watched, a camera of the demonstration is missing, or no depth was
+                measured.
+            NoConfidentMatch: if the confidence is below `min_confidence`.
+        """
+        if not self._demonstrations:
+            raise InvalidInput("demonstration", "none was watched", "call watch(demonstration) before act")
+        if missing := sorted(self._cameras - set(observation.views)):
+            raise InvalidInput(
+                "views", f"camera {missing[0]} is missing", f"all of {', '.join(sorted(self._cameras))}"
+            )
+        query = self._scene(observation)
+        number, step = self._router.route(query)
+        demonstrated = self._demonstrations[number][step].action
+        prepared = self._prepared[number][step]
+        hypotheses = prepared.match(query, self._hints)
+        trust = confidence(hypotheses, demonstrated.T_world_gripper)
+        if trust < self._min_confidence or not hypotheses:
+            raise NoConfidentMatch(trust, self._min_confidence)
+        best = hypotheses[0]
+        self._hints = [best.T_query_support]
+        T_world_gripper = _orthonormal(best.T_query_support @ demonstrated.T_world_gripper)
+        match = Match(step, best.p_support, best.p_query, prepared.region)
+        return Action(T_world_gripper, demonstrated.gripper_open, demonstrated.allow_collisions, trust, match)
+
+    def _scene(self, observation: Observation) -> Scene:
+        return Scene(observation, self._perception(observation))
+
+
+def _orthonormal(T: FloatArray) -> FloatArray:
+    """The pose with rounding errors of its rotation removed."""
+    U, _, Vh = np.linalg.svd(T[:3, :3])
+    clean = T.copy()
+    clean[:3, :3] = U @ Vh
+    return clean

@@ -1,0 +1,152 @@
+"""The matcher without learning: descriptors, sampled motions, upright seeds, closest points."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from imop.geometry import se3
+from imop.geometry.cloud import PointCloud, farthest_points, voxel_downsample
+from imop.geometry.features import fpfh
+from imop.geometry.neighbours import within
+from imop.policy.evidence import Evidence
+from imop.policy.hypotheses import distinct, mutual_matches, sample_motions
+from imop.policy.matcher import Hypothesis, Scene, Transition
+from imop.policy.objects import connected, find_objects
+from imop.policy.refine import FINEST, Refiner
+from imop.policy.region import SAME, Region, find_regions
+from imop.types import FloatArray
+
+# How many of the refined motions get the finest stage too.
+FINISHED = 4
+
+
+@dataclass(frozen=True)
+class RegistrationMatcher:
+    """Fast point feature histograms, sampled rigid motions and closest points, on clouds without labels.
+
+    Attributes:
+        spacing: of the points that get descriptors, metres.
+        radius: of a descriptor's neighbourhood, metres.
+        color_weight: of colours in the comparison of descriptors.
+        turns: upright seeds for every object in the query, spread over a full turn.
+        refined: how many seeds are refined by closest points.
+        least_turn: share of its score that a hypothesis loses for half a turn.
+        seed: of the sampling.
+    """
+
+    spacing: float = 0.01
+    radius: float = 0.05
+    color_weight: float = 2.0
+    turns: int = 24
+    refined: int = 12
+    least_turn: float = 0.05
+    seed: int = 0
+
+    def prepare(self, steps: Sequence[Transition]) -> list["RegisteredStep"]:
+        """Find the regions of a demonstration and describe them."""
+        return [
+            RegisteredStep(self, step, region)
+            for step, region in zip(steps, find_regions(steps), strict=True)
+        ]
+
+    def describe(self, cloud: PointCloud) -> tuple[PointCloud, FloatArray]:
+        """The thinned cloud and a descriptor (N, 36) of every point: shape and colour."""
+        sparse = voxel_downsample(cloud, self.spacing)
+        assert sparse.normals is not None
+        shape = fpfh(sparse.points, sparse.normals, self.radius) / 200.0
+        return sparse, np.concatenate([shape, self.color_weight / 10 * sparse.colors], axis=1)
+
+
+class RegisteredStep:
+    """A demonstrated step prepared for registration."""
+
+    def __init__(self, matcher: RegistrationMatcher, step: Transition, region: Region) -> None:
+        self._matcher = matcher
+        self._region = region
+        self._T_world_gripper = step.before.observation.T_world_gripper
+        self._sparse, self._descriptors = matcher.describe(region.cloud)
+        self._coarse = farthest_points(region.cloud.points, 150)
+        self._fine = farthest_points(region.cloud.points, 1200)
+
+    @property
+    def region(self) -> FloatArray:
+        """(M, 3) points of the region in the demonstrated scene."""
+        return self._region.cloud.points
+
+    def match(self, query: Scene, hints: Sequence[FloatArray] = ()) -> tuple[Hypothesis, ...]:
+        """Where the region is in the query, best first; see `PreparedStep.match`."""
+        things = self._without_held(query)
+        if len(things) < 5:
+            return ()
+        evidence = Evidence(things, query.observation.views)
+        T_held = query.observation.T_world_gripper @ se3.invert(self._T_world_gripper)
+        seeds = np.concatenate(
+            [
+                np.reshape([*hints, T_held, np.eye(4)], (-1, 4, 4)),
+                self._sampled(things),
+                self._upright(things),
+            ]
+        )
+        coarse = self._region.cloud.select(self._coarse)
+        weight = self._region.weight[self._coarse]
+        # Every hint is refined, of the other seeds the most promising.
+        lead = len(hints) + 2
+        scores = [evidence.score(coarse, weight, T).score for T in seeds[lead:]]
+        order = lead + np.argsort(-np.asarray(scores), kind="stable")
+        center = self.region.mean(axis=0)
+        chosen = order[distinct(seeds[order], center, keep=self._matcher.refined)]
+        return self._refined(evidence, things, seeds[[*range(lead), *chosen]])
+
+    def _refined(self, evidence: Evidence, things: PointCloud, seeds: FloatArray) -> tuple[Hypothesis, ...]:
+        refine = Refiner(things.points)
+        fine = self._region.cloud.select(self._fine)
+        weight = self._region.weight[self._fine]
+        found = [evidence.score(fine, weight, refine(fine.points, T)) for T in seeds]
+        found.sort(key=lambda hypothesis: -hypothesis.score)
+        # The last half millimetre is worth looking for only where it matters.
+        for i, hypothesis in enumerate(found[:FINISHED]):
+            finer = evidence.score(fine, weight, refine(fine.points, hypothesis.T_query_support, FINEST))
+            found[i] = max(hypothesis, finer, key=lambda h: h.score)
+        # Symmetric things have many equal explanations: the one that turns least is the easiest to reach.
+        turned = se3.rotation_distance(np.stack([h.T_query_support for h in found]), np.eye(4)) / np.pi
+        preference = np.array([h.score for h in found]) * (1.0 - self._matcher.least_turn * turned)
+        found = [found[i] for i in np.argsort(-preference, kind="stable")]
+        motions = np.stack([hypothesis.T_query_support for hypothesis in found])
+        return tuple(found[i] for i in distinct(motions, self.region.mean(axis=0), keep=len(found)))
+
+    def _without_held(self, query: Scene) -> PointCloud:
+        cloud = find_objects(query.cloud).cloud
+        if not len(self._region.p_gripper_held):
+            return cloud
+        p_held = se3.apply(query.observation.T_world_gripper, self._region.p_gripper_held)
+        return cloud.select(~within(cloud.points, p_held, SAME))
+
+    def _sampled(self, things: PointCloud) -> FloatArray:
+        """(H, 4, 4) motions from matched descriptors."""
+        sparse, descriptors = self._matcher.describe(things)
+        pairs = mutual_matches(self._descriptors, descriptors)
+        x, y = self._sparse.select(pairs.i_support), sparse.select(pairs.i_query)
+        assert x.normals is not None and y.normals is not None
+        return sample_motions(x.points, y.points, x.normals, y.normals, pairs.weight, seed=self._matcher.seed)
+
+    def _upright(self, things: PointCloud) -> FloatArray:
+        """(H, 4, 4) motions that set the region on the place of every object of the query, in every turn."""
+        center = _middle(self.region)
+        labels = connected(things.points)
+        places = [_middle(things.points[labels == label]) for label in range(labels.max() + 1)]
+        turns = np.linspace(0.0, 2 * np.pi, self._matcher.turns, endpoint=False)
+        return np.stack(list(_about(center, places, turns)))
+
+
+def _middle(points: FloatArray) -> FloatArray:
+    """Centre of the bounding box: which side was seen shifts it less than the mean."""
+    middle: FloatArray = (points.min(axis=0) + points.max(axis=0)) / 2
+    return middle
+
+
+def _about(center: FloatArray, places: Iterable[FloatArray], turns: FloatArray) -> Iterable[FloatArray]:
+    for place in places:
+        for turn in turns:
+            R = se3.euler(z=float(turn))
+            yield se3.make(R, place - R @ center)
