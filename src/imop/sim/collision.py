@@ -16,7 +16,7 @@ CLEARANCE = 0.004
 RESOLUTION = 0.03
 """Largest distance (2-norm, radians) between checked configurations of a motion."""
 GOAL_DEPTH = 0.002
-"""Metres that the gripper or what it holds may press into something at the goal: goals are contacts."""
+"""Metres that a finger or what it holds may press into something at the goal: goals are often contacts."""
 _START_SLACK = 0.001
 
 
@@ -84,9 +84,11 @@ class CollisionChecker:
                 self._threshold[a, b] = self._threshold[b, a] = allowed
 
     def expect_goal(self, q_goal: FloatArray) -> None:
-        """Let the gripper and what it holds come as near to other things as they are at the goal."""
-        moving = self._gripper | self._held.members
-        self._relax(q_goal, moving[:, None] | moving[None, :], -GOAL_DEPTH, 1e-5)
+        """Let the gripper come as near to other things as it is at the goal; fingers and load may press."""
+        pressing = self._held.members | self._gripper
+        self._relax(q_goal, pressing[:, None] | pressing[None, :], 0.0, 1e-5)
+        pressing[self._hand] = False
+        self._relax(q_goal, pressing[:, None] | pressing[None, :], -GOAL_DEPTH, 1e-5)
 
     def valid(self, q: FloatArray) -> bool:
         """Whether the arm at `q` (7,) keeps its distances."""

@@ -3,6 +3,7 @@
 import time
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
 
 from imop.sim.gripper import PERIOD_STEPS, OnFrame, set_gripper
@@ -65,18 +66,31 @@ def execute(
 
 def move(world: World, trajectory: Trajectory, on_frame: OnFrame | None = None) -> None:
     """Follow a trajectory from where the arm is, and wait until the arm rests."""
-    lead = _velocity_lead(world)
-    dt = world.model.opt.timestep
-    times = np.arange(1, int(np.ceil(trajectory.duration / dt / _CONTROL_STEPS)) + 1) * dt * _CONTROL_STEPS
+    period = world.model.opt.timestep * _CONTROL_STEPS
+    # Each target is held for one period, so it is the one of the period's middle.
+    times = (np.arange(int(np.ceil(trajectory.duration / period))) + 0.5) * period
     q = _interpolate(times, trajectory.times, trajectory.positions)
     dq = _interpolate(times, trajectory.times, trajectory.velocities)
-    dq[-1] = 0.0
-    for i, target in enumerate(q + lead * dq):
-        world.data.ctrl[world.arm_ctrl] = target
+    ddq = np.gradient(dq, period, axis=0) if len(dq) > 1 else np.zeros_like(dq)
+    for i in range(len(q)):
+        world.data.ctrl[world.arm_ctrl] = _servo_target(world, q[i], dq[i], ddq[i])
         world.step(_CONTROL_STEPS)
-        if on_frame is not None and i % (PERIOD_STEPS // _CONTROL_STEPS) == 0:
+        if on_frame is not None and (i + 1) % (PERIOD_STEPS // _CONTROL_STEPS) == 0:
             on_frame(world)
+    world.data.ctrl[world.arm_ctrl] = trajectory.positions[-1]
     _settle(world, trajectory.positions[-1], on_frame)
+
+
+def _servo_target(world: World, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
+    """Where the servos (7,) must pull so that neither their damping nor the arm's inertia holds it back."""
+    m, d = world.model, world.data
+    acceleration, torque = np.zeros(m.nv), np.zeros(m.nv)
+    acceleration[world.arm_dof] = ddq
+    mujoco.mj_mulM(m, d, torque, acceleration)
+    resistance = m.dof_damping[world.arm_dof] - m.actuator_biasprm[world.arm_ctrl, 2]
+    force = torque[world.arm_dof] + resistance * dq
+    target: FloatArray = q + force / m.actuator_gainprm[world.arm_ctrl, 0]
+    return target
 
 
 def _settle(world: World, q_goal: FloatArray, on_frame: OnFrame | None) -> None:
@@ -86,15 +100,6 @@ def _settle(world: World, q_goal: FloatArray, on_frame: OnFrame | None) -> None:
             on_frame(world)
         if np.abs(world.robot_q - q_goal).max() < _ARRIVED and np.abs(world.robot_dq).max() < _AT_REST:
             return
-
-
-def _velocity_lead(world: World) -> FloatArray:
-    """Seconds (7,) by which a servo's target must lead for its damping not to hold the arm back."""
-    m = world.model
-    stiffness = m.actuator_gainprm[world.arm_ctrl, 0]
-    resistance = m.dof_damping[world.arm_dof] - m.actuator_biasprm[world.arm_ctrl, 2]
-    lead: FloatArray = resistance / stiffness
-    return lead
 
 
 def _interpolate(times: FloatArray, known: FloatArray, values: FloatArray) -> FloatArray:
