@@ -73,7 +73,8 @@ def _draw(axis: Axes, panel: Panel) -> None:
     match = panel.action.match
     if match is not None:
         if len(match.region):
-            axis.scatter(*project(match.region).T, s=2.0, color=REGION_COLOR, linewidths=0)
+            region = project(match.region)
+            axis.scatter(region[:, 0], region[:, 1], s=2.0, color=REGION_COLOR, linewidths=0)
         chosen = np.linspace(0, len(match.p_support) - 1, min(MAX_LINES, len(match.p_support))).astype(int)
         ends = np.stack([project(match.p_support[chosen]), project(match.p_query[chosen]) + right], axis=1)
         axis.add_collection(LineCollection(list(ends), colors=MATCH_COLOR, linewidths=0.5, alpha=0.7))
@@ -91,7 +92,7 @@ def _draw_scene(axis: Axes, observation: Observation, shift: FloatArray) -> None
     cloud = clouds.voxel_downsample(cloud, 0.006)
     far_to_near = np.argsort(cloud.points @ VIEW[2])
     positions = project(cloud.points)[far_to_near] + shift
-    axis.scatter(*positions.T, s=1.6, c=cloud.colors[far_to_near], linewidths=0)
+    axis.scatter(positions[:, 0], positions[:, 1], s=1.6, c=cloud.colors[far_to_near], linewidths=0)
 
 
 def _draw_gripper(axis: Axes, T_world_gripper: FloatArray, shift: FloatArray) -> None:

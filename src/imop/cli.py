@@ -1,0 +1,208 @@
+"""A robot arm learns a manipulation task from one demonstration, without retraining.
+
+Exit codes: 0 done, 1 the task failed or the data have errors, 2 bad input.
+"""
+
+import sys
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+from rich.console import Console
+from tyro.conf import Positional
+
+from imop.errors import ImopError
+
+# Verbs import what they need when they run, so that --help does not wait for torch and MuJoCo.
+
+app = tyro.extras.SubcommandApp()
+console = Console()
+
+
+@app.command
+def run(
+    task: str,
+    seed: int = 1,
+    variation: int = 0,
+    instance: int = 0,
+    demo: Path | None = None,
+    method: Literal["replay", "registration", "oracle"] = "registration",
+    min_confidence: float = 0.0,
+    video: bool = True,
+    out: Path = Path("runs/run"),
+) -> int:
+    """Show the policy one demonstration of a task, then let it perform the task in another scene.
+
+    Writes result.json, steps.png (demonstration, region, correspondences, predicted gripper) and rollout.mp4.
+
+    Args:
+        task: suite and name, such as tabletop/lid_off_pot; `imop tasks` lists them.
+        seed: scene to perform the task in.
+        variation: which variation of the task.
+        instance: seed of the objects' shapes, sizes and colours.
+        demo: folder with a recorded demonstration, its first episode; records one if not given.
+        method: how poses are carried over from the demonstration.
+        min_confidence: stop instead of acting below this confidence, 0 to 1.
+        video: whether to draw rollout.mp4, which takes longer than the task itself.
+        out: folder for the results.
+    """
+    from imop.demos.load import load_demonstrations
+    from imop.evaluation.run import perform, steps_table
+    from imop.evaluation.trials import Trial, demonstration_for
+
+    trial = Trial(task, seed, variation, instance)
+    with console.status(f"recording one demonstration of {task}" if demo is None else f"reading {demo}"):
+        shown = demonstration_for(trial) if demo is None else load_demonstrations(demo, 1)[0]
+    with console.status(f"performing {task} in scene {seed}"):
+        result = perform(trial, shown, method, out, min_confidence, video)
+    console.print(steps_table(result))
+    verdict = "[green]success[/]" if result.success else f"[red]failed[/]: {result.reason}"
+    console.print(f"{task}, scene {seed}: {verdict}")
+    for path in sorted(out.iterdir()):
+        console.print(f"  {path}", highlight=False)
+    return 0 if result.success else 1
+
+
+@app.command
+def collect(
+    out: Path,
+    suite: str = "tabletop",
+    tasks: tuple[str, ...] = (),
+    episodes: int = 10,
+    seed: int = 0,
+    jobs: int = 2,
+) -> int:
+    """Record demonstrations by the expert into a store, every task and variation.
+
+    Args:
+        out: folder of the store; an existing one is appended to.
+        suite: which suite.
+        tasks: names within the suite; all if none is given.
+        episodes: demonstrations per task and variation.
+        seed: first seed of the scenes.
+        jobs: parallel processes.
+    """
+    from imop.evaluation.collect import collect_suite
+
+    recorded, failed = collect_suite(out, suite, tasks, episodes, seed, jobs, console)
+    console.print(f"{recorded} demonstrations in {out}; {failed} expert attempts failed and were repeated")
+    return 0
+
+
+@app.command(name="eval")
+def evaluate(
+    suite: str = "tabletop",
+    tasks: tuple[str, ...] = (),
+    methods: Annotated[str, tyro.conf.arg(metavar="NAME,NAME")] = "replay,registration,oracle,expert",
+    episodes: int = 25,
+    seed: int = 0,
+    instance: int = 0,
+    jobs: int = 2,
+    out: Path = Path("runs/eval"),
+) -> int:
+    """Success rates of several methods on the same demonstrations and scenes.
+
+    Prints the table and writes results.json and report.md.
+
+    Args:
+        suite: which suite.
+        tasks: names within the suite; all if none is given.
+        methods: any of replay, registration, oracle (true object poses), expert, joined by commas.
+        episodes: scenes per task, spread over its variations.
+        seed: first seed of the scenes.
+        instance: seed of the objects' shapes, sizes and colours.
+        jobs: parallel processes.
+        out: folder for the results.
+    """
+    from imop.evaluation.benchmark import evaluate_suite
+
+    results = evaluate_suite(suite, tasks, methods.split(","), episodes, seed, instance, jobs, console)
+    results.save(out)
+    console.print(results.table())
+    console.print(f"{out / 'report.md'}\n{out / 'results.json'}", highlight=False)
+    return 0
+
+
+@app.command(name="import")
+def import_(layout: Positional[Literal["rlbench"]], source: Positional[Path], out: Positional[Path]) -> int:
+    """Convert recorded demonstrations into a store.
+
+    Args:
+        layout: how the recordings are laid out: rlbench as PerAct, RVT and Act3D use it.
+        source: an episode, a task folder, or a folder of task folders.
+        out: folder of the store; an existing one is appended to.
+    """
+    from imop.demos.rlbench import import_rlbench
+
+    with console.status(f"importing {source}"):
+        count = import_rlbench(source, out)
+    console.print(f"{count} demonstrations imported into {out}")
+    return 0
+
+
+@app.command
+def check(path: Positional[Path]) -> int:
+    """Say what is wrong with recorded demonstrations, where, and how to mend it.
+
+    Args:
+        path: a store, or a folder in RLBench's layout.
+    """
+    from imop.demos.check import check as find
+
+    with console.status(f"checking {path}"):
+        findings = find(path)
+    for finding in findings:
+        console.print(str(finding), highlight=False)
+    errors = sum(finding.severity == "error" for finding in findings)
+    console.print(f"{path}: {errors} errors, {len(findings) - errors} warnings")
+    return 1 if errors else 0
+
+
+@app.command
+def predict(
+    demo: Path,
+    query: Path,
+    method: Literal["replay", "registration"] = "registration",
+    out: Path = Path("runs/predict"),
+) -> int:
+    """Predict the action at every keyframe of a recorded episode from one demonstration; nothing moves.
+
+    Writes result.json and steps.png.
+
+    Args:
+        demo: the demonstration: a store or an RLBench episode, its first episode.
+        query: the recorded episode to predict, likewise.
+        method: how poses are carried over from the demonstration.
+        out: folder for the results.
+    """
+    from imop.demos.load import load_demonstrations
+    from imop.evaluation.run import predict_recorded, predictions_table
+
+    shown, recorded = (load_demonstrations(path, 1)[0] for path in (demo, query))
+    with console.status(f"predicting {query}"):
+        predictions = predict_recorded(shown, recorded, method, out)
+    console.print(predictions_table(predictions))
+    for path in sorted(out.iterdir()):
+        console.print(f"  {path}", highlight=False)
+    return 0
+
+
+@app.command
+def tasks() -> int:
+    """List suites, tasks, variations and their instructions."""
+    from imop.evaluation.trials import tasks_table
+
+    console.print(tasks_table())
+    return 0
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Entry point of `imop`."""
+    try:
+        code = app.cli(prog="imop", description=__doc__, args=arguments)
+    except ImopError as error:
+        Console(stderr=True, soft_wrap=True).print(f"[red]error:[/] {error}", highlight=False)
+        code = 2
+    except KeyboardInterrupt:
+        code = 130
+    sys.exit(code)

@@ -1,0 +1,153 @@
+"""One task, one demonstration, one new scene: perform it and show what happened."""
+
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+from rich.table import Table
+
+from imop.evaluation.open_loop import Prediction, predict
+from imop.evaluation.picture import Panel, save_picture
+from imop.evaluation.report import save_json
+from imop.evaluation.rollout import Rollout, rollout
+from imop.evaluation.trials import Trial, make_policy
+from imop.evaluation.video import save_video
+from imop.geometry import se3
+from imop.sim.cameras import Camera, render_view
+from imop.sim.world import World
+from imop.types import Action, ByteArray, Demonstration, FloatArray, Observation
+
+VIDEO_SIZE = (320, 240)
+VIDEO_STRIDE = 2
+"""Every second frame of 0.05 simulated seconds is drawn, and shown at twice the real speed."""
+
+
+def _looking_at(target: FloatArray, position: FloatArray) -> FloatArray:
+    """T_world_camera (4, 4) of a camera that keeps the horizon level."""
+    forward = (target - position) / np.linalg.norm(target - position)
+    right = np.cross(forward, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    return se3.make(np.stack([right, np.cross(forward, right), forward], axis=1), position)
+
+
+AUDIENCE = Camera(_looking_at(np.array([0.2, 0.0, 0.95]), np.array([1.5, -0.9, 1.6])), np.radians(40.0), 5.0)
+
+
+class _Film:
+    """Draws every second frame."""
+
+    def __init__(self) -> None:
+        self.frames: list[ByteArray] = []
+        self._seen = 0
+
+    def __call__(self, world: World) -> None:
+        if self._seen % VIDEO_STRIDE == 0:
+            self.frames.append(render_view(world, AUDIENCE, *VIDEO_SIZE))
+        self._seen += 1
+
+
+def perform(
+    trial: Trial,
+    demonstration: Demonstration,
+    method: str,
+    out: Path,
+    min_confidence: float = 0.0,
+    video: bool = True,
+) -> Rollout:
+    """Let a method that was shown `demonstration` act in the trial's scene.
+
+    Writes result.json, steps.png and, if wanted, rollout.mp4 into `out`.
+
+    Raises:
+        ImopError: if the demonstration or the scene cannot be used.
+    """
+    env = trial.env()
+    policy = make_policy(method, env.world, min_confidence)
+    policy.watch(demonstration if method == "oracle" else demonstration.stripped())
+    film = _Film()
+    env.on_frame = film if video else None
+    panels: list[Panel] = []
+
+    def expert_pose(step: int) -> FloatArray | None:
+        waypoints = env.task.waypoints(env.world)
+        return waypoints[step].target(env.world) if step < len(waypoints) else None
+
+    def on_action(observation: Observation, action: Action) -> None:
+        step = action.match.step if action.match else len(panels)
+        panels.append(Panel(demonstration.keyframes[step], observation, action, f"step {step}"))
+
+    result = rollout(env, policy, len(demonstration), expert_pose, on_action)
+    save_json({**asdict(trial), "method": method, **result.as_dict()}, out / "result.json")
+    if panels:
+        save_picture(panels, out / "steps.png")
+    if film.frames:
+        save_video(film.frames, out / "rollout.mp4")
+    return result
+
+
+def steps_table(result: Rollout) -> Table:
+    """The steps of an episode for the terminal."""
+    table = Table()
+    for column in ("action", "support step", "off the expert", "confidence", "decided in", "moved in"):
+        table.add_column(column, justify="right")
+    for number, step in enumerate(result.steps):
+        table.add_row(
+            str(number),
+            "-" if step.support_step is None else str(step.support_step),
+            _error(step.position_error, step.rotation_error),
+            f"{step.confidence:.2f}",
+            f"{step.policy_seconds:.2f} s",
+            step.plan_failed or f"{step.motion_seconds:.2f} s",
+        )
+    return table
+
+
+def predict_recorded(
+    demonstration: Demonstration, recorded: Demonstration, method: str, out: Path
+) -> list[Prediction]:
+    """Predict every keyframe of `recorded` and write result.json and steps.png into `out`.
+
+    Raises:
+        ImopError: if either recording cannot be used.
+    """
+    policy = make_policy(method)
+    policy.watch(demonstration.stripped())
+    predictions = predict(policy, recorded)
+    steps = [
+        {
+            "step": p.step,
+            "T_world_gripper": se3.to_pose7(p.action.T_world_gripper).tolist(),
+            "gripper_open": p.action.gripper_open,
+            "allow_collisions": p.action.allow_collisions,
+            "confidence": p.action.confidence,
+            "position_error": p.position_error,
+            "rotation_error": p.rotation_error,
+            "seconds": p.seconds,
+        }
+        for p in predictions
+    ]
+    save_json({"method": method, "steps": steps}, out / "result.json")
+    panels = []
+    for p in predictions:
+        step = p.action.match.step if p.action.match else min(p.step, len(demonstration) - 1)
+        seen = recorded.keyframes[p.step].observation
+        panels.append(Panel(demonstration.keyframes[step], seen, p.action, f"step {p.step}"))
+    save_picture(panels, out / "steps.png")
+    return predictions
+
+
+def predictions_table(predictions: list[Prediction]) -> Table:
+    """Open-loop predictions for the terminal."""
+    table = Table()
+    for column in ("keyframe", "off the recording", "confidence", "decided in"):
+        table.add_column(column, justify="right")
+    for p in predictions:
+        off = _error(p.position_error, p.rotation_error)
+        table.add_row(str(p.step), off, f"{p.action.confidence:.2f}", f"{p.seconds:.2f} s")
+    return table
+
+
+def _error(position: float | None, rotation: float | None) -> str:
+    if position is None or rotation is None:
+        return "-"
+    return f"{100 * position:.2f} cm, {np.degrees(rotation):.1f} deg"
