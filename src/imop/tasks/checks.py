@@ -37,7 +37,7 @@ def settle(world: World) -> None:
 
 
 def at_rest(world: World, before: Mapping[str, FloatArray]) -> bool:
-    """Whether nothing moves now, and the bodies in `before` (name -> T_world_body) moved hardly since then."""
+    """Whether nothing moves now, and the bodies in `before` (name -> T_world_body) are where they were."""
     if np.abs(world.data.qvel).max() > _SPEED:
         return False
     moved = [(T, world.pose(body)) for body, T in before.items()]
@@ -72,7 +72,7 @@ def _touched(world: World) -> set[str]:
 
 
 def rehearse(world: World, waypoints: Sequence[Waypoint]) -> str:
-    """Plan the motions one after the other, the arm jumping to the end of each, as RLBench validates its scenes.
+    """Plan the motions in order, the arm jumping to the end of each, as RLBench validates its scenes.
 
     Even where collisions are allowed, the open hand may end up touching nothing but the body it works on.
 

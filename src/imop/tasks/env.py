@@ -1,4 +1,4 @@
-"""Tasks as Gymnasium environments: one step is one gripper pose, planned, reached and followed by the fingers."""
+"""Tasks as Gymnasium environments: one step reaches one gripper pose, then moves the fingers."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -82,8 +82,12 @@ def to_observation(observation: Mapping[str, Any]) -> Observation:
 
 def _to_dict(observation: Observation) -> ObservationDict:
     def arrays(view: CameraView) -> ObservationDict:
-        fields = {"rgb": view.rgb, "depth": view.depth, "intrinsics": view.intrinsics}
-        return {k: v.copy() for k, v in {**fields, "T_world_camera": view.T_world_camera}.items()}
+        return {
+            "rgb": view.rgb.copy(),
+            "depth": view.depth.copy(),
+            "intrinsics": view.intrinsics.copy(),
+            "T_world_camera": view.T_world_camera.copy(),
+        }
 
     assert observation.joint_positions is not None
     return {
@@ -113,9 +117,9 @@ def _view_space() -> spaces.Dict:
 class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
     """One task. `reset` makes a new scene, `step` performs one action of the form of `to_array`.
 
-    `reset(seed=..., options={"variation": ..., "instance_seed": ...})`: the seed decides poses and clutter; the
-    instance seed decides shapes, sizes and colours and is the seed unless given. The reward is 1 when the aim is
-    reached, which ends the episode. So does a motion that cannot be planned, with reward 0 and
+    `reset(seed=..., options={"variation": ..., "instance_seed": ...})`: the seed decides poses and clutter;
+    the instance seed decides shapes, sizes and colours and is the seed unless given. The reward is 1 when
+    the aim is reached, which ends the episode. So does a motion that cannot be planned, with reward 0 and
     `info["plan_failed"]` the reason. `info["success"]` says whether the aim is reached.
 
     Args:
@@ -185,8 +189,13 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
         if given:
             raise InvalidInput("options", ", ".join(map(str, given)), "variation, instance_seed")
         self._world = make_scene(self.task, variation, instance, episode)
-        info = {"success": False, "variation": variation, "instance_seed": instance, "seed": episode}
-        info["instructions"] = self.task.instructions(variation)
+        info = {
+            "success": False,
+            "variation": variation,
+            "instance_seed": instance,
+            "seed": episode,
+            "instructions": self.task.instructions(variation),
+        }
         return self._observe(0), info
 
     def step(self, action: FloatArray) -> tuple[ObservationDict, float, bool, bool, dict[str, Any]]:

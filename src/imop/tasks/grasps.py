@@ -1,4 +1,4 @@
-"""Gripper rotations in the frame of what is grasped: z approaches, y is the direction the fingers close in."""
+"""Gripper poses in the frame of what is grasped: z approaches, y is the closing direction."""
 
 import numpy as np
 

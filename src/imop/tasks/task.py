@@ -41,7 +41,7 @@ class Task(ABC):
     def items(self) -> Sequence[Item]:
         """What has to be placed on the table, the largest first."""
 
-    def arrange(self, world: World, rng: np.random.Generator) -> None:
+    def arrange(self, world: World, rng: np.random.Generator) -> None:  # noqa: B027 (optional)
         """Complete the scene after the items were placed (a lid onto its pot); nothing by default."""
 
     @abstractmethod

@@ -51,8 +51,8 @@ class CabinetShape:
 def drawer_cabinet(shape: CabinetShape, color: Color, front_color: Color, handle_color: Color) -> Any:
     """A fixed cabinet that opens towards +x; frame: centre of its base.
 
-    Its drawers are the bodies "drawer0" (lowest), "drawer1", ... on slides of the same names, 0 closed; the frame of
-    a drawer is the centre of its handle's bar, which lies along y.
+    Its drawers are the bodies "drawer0" (lowest), "drawer1", ... on slides of the same names, 0 closed;
+    the frame of a drawer is the centre of its handle's bar, which lies along y.
     """
     spec, body = part(fixed=True)
     x, y, z = shape.depth / 2, shape.width / 2, shape.height

@@ -1,5 +1,6 @@
 """Take the lid off a pot."""
 
+# ruff: noqa: D102 (the methods are described in Task)
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,7 +20,7 @@ _LIFT = 0.15
 
 
 class LidOffPot(Task):
-    """Grasp the knob from above, closing across the handles' axis, and lift. Done when the lid is held 8 cm up."""
+    """Grasp the knob from above and lift. Done when the lid is held 8 cm above its place on the pot."""
 
     name = "tabletop/lid_off_pot"
     graspable = ("lid/body",)

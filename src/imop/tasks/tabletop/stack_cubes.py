@@ -1,5 +1,6 @@
 """Stack cubes of one colour on a base plate."""
 
+# ruff: noqa: D102 (the methods are described in Task)
 from collections.abc import Sequence
 from typing import Any
 
@@ -31,7 +32,7 @@ def aim(variation: int) -> tuple[str, int]:
 
 
 class StackCubes(Task):
-    """One or two cubes of the variation's colour go onto the plate; cubes of other colours stay where they are."""
+    """One or two cubes of the variation's colour go onto the plate; cubes of other colours distract."""
 
     name = "tabletop/stack_cubes"
     variations = len(COLORS) * len(COUNTS)
