@@ -8,7 +8,8 @@ import mujoco
 import numpy as np
 
 from imop.geometry import se3
-from imop.sim.panda_shell import HALF_TURN, SHELLS
+from imop.geometry.self_filter import SelfFilter
+from imop.sim.panda_shell import SHELLS
 from imop.types import FloatArray, as_array
 
 ARM_JOINTS = tuple(f"joint{i}" for i in range(1, 8))
@@ -29,18 +30,16 @@ PANDA_HOME_Q = np.radians([0.0, 10.0, 0.0, -50.0, 0.0, 70.0, 45.0]) + RLBENCH_JO
 """Start configuration of RLBench in Franka's convention."""
 
 T_WORLD_BASE = se3.make(p=(-0.2680, -0.0064, 0.7500))
-T_FLANGE_HAND = se3.make(se3.euler(z=-HALF_TURN / 4))
-T_FLANGE_TIP = se3.make(se3.euler(z=3 * HALF_TURN / 4), (0.0014, 0.0014, 0.1099))
+T_FLANGE_HAND = se3.make(se3.euler(z=-np.pi / 4), (0.0014, 0.0014, -0.0023))
+"""RLBench's hand sits 2 mm beside and 2.3 mm behind Franka's; relative to it the fingers are Franka's."""
+T_FLANGE_TIP = se3.make(se3.euler(z=3 * np.pi / 4), (0.0014, 0.0014, 0.1099))
 """To RLBench's tip: between the finger ends, +z the approach direction, +y the closing direction."""
 
 _FLANGE = 0.107
-_FINGER_BASE = 0.0561
-_FINGER_OFFSET = 0.002
+_FINGER_BASE = 0.0584
 
 # Modified Denavit-Hartenberg: x rotation and x translation before the joint, z translation with it.
-_ALPHA = np.array(
-    [0.0, -HALF_TURN / 2, HALF_TURN / 2, HALF_TURN / 2, -HALF_TURN / 2, HALF_TURN / 2, HALF_TURN / 2]
-)
+_ALPHA = np.array([0.0, -np.pi / 2, np.pi / 2, np.pi / 2, -np.pi / 2, np.pi / 2, np.pi / 2])
 _A = np.array([0.0, 0.0, 0.0, 0.0825, -0.0825, 0.0, 0.088])
 _D = np.array([0.333, 0.0, 0.316, 0.0, 0.384, 0.0, 0.0])
 
@@ -91,6 +90,16 @@ _DAMPING = _STIFFNESS / 10
 # A finger that yields to less than these lets go of a thin handle.
 _FINGER_STIFFNESS, _FINGER_DAMPING, _FINGER_FORCE = 4000.0, 20.0, 20.0
 _FINGER_FRICTION = 80.0  # with the force limit it bounds the speed to RLBench's 0.2 m/s or so
+
+# Around the fingers is what they hold; the lower links, several millimetres off in RLBench, touch nothing.
+_FILTER_MARGIN = {
+    "": 0.008,
+    "link0": 0.015,
+    "link1": 0.012,
+    "link2": 0.012,
+    "left_finger": 0.002,
+    "right_finger": 0.002,
+}
 
 # Shapes that overlap at rest although their bodies are not neighbours in MuJoCo's sense.
 _IGNORED_PAIRS = (
@@ -159,6 +168,12 @@ def panda_spec() -> mujoco.MjSpec:
     return spec
 
 
+def panda_self_filter() -> SelfFilter:
+    """The filter that knows the Panda's points in a scene with its base at `T_WORLD_BASE`."""
+    model = panda_spec().compile()
+    return SelfFilter(model, ARM_JOINTS, FINGER_JOINTS, T_WORLD_BASE, _FILTER_MARGIN)
+
+
 def _add_body(parent: mujoco.MjsBody, name: str, T_parent_body: FloatArray) -> mujoco.MjsBody:
     pose = se3.to_pose7(T_parent_body)
     body = parent.add_body(name=name, pos=pose[:3], quat=pose[[6, 3, 4, 5]], gravcomp=1)
@@ -181,8 +196,8 @@ def _add_tip(hand: mujoco.MjsBody) -> None:
 
 def _add_fingers(spec: mujoco.MjSpec, hand: mujoco.MjsBody) -> None:
     """finger_joint1 on the hand's +y side, which is the -y side of the tip; the second mirrors the first."""
-    T_hand_finger = se3.make(p=(0, _FINGER_OFFSET, _FINGER_BASE))
-    turned = se3.make(se3.euler(z=HALF_TURN))
+    T_hand_finger = se3.make(p=(0, 0, _FINGER_BASE))
+    turned = se3.make(se3.euler(z=np.pi))
     for name, body_name, T in zip(
         FINGER_JOINTS, ("left_finger", "right_finger"), (T_hand_finger, T_hand_finger @ turned), strict=True
     ):

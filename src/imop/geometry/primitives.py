@@ -1,0 +1,62 @@
+"""Signed distances from points to primitive shapes: negative inside, in the shape's own frame.
+
+Sizes are MuJoCo's: half extents of boxes and ellipsoids, (radius, half length) of capsules and
+cylinders along z.
+"""
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from imop.types import FloatArray
+
+
+def sphere(p: FloatArray, size: FloatArray) -> FloatArray:
+    """Distances (N,) of points `p` (N, 3) to a sphere of radius size[0]."""
+    return np.asarray(np.linalg.norm(p, axis=1) - size[0])
+
+
+def capsule(p: FloatArray, size: FloatArray) -> FloatArray:
+    """Distances (N,) of points `p` (N, 3) to a capsule of radius size[0] and half length size[1] along z."""
+    z = p[:, 2] - np.clip(p[:, 2], -size[1], size[1])
+    return np.asarray(np.sqrt(p[:, 0] ** 2 + p[:, 1] ** 2 + z**2) - size[0])
+
+
+def cylinder(p: FloatArray, size: FloatArray) -> FloatArray:
+    """Distances (N,) of points `p` (N, 3) to a cylinder of radius size[0] and half length size[1] along z."""
+    return _beyond(np.stack([np.hypot(p[:, 0], p[:, 1]) - size[0], np.abs(p[:, 2]) - size[1]], axis=1))
+
+
+def box(p: FloatArray, size: FloatArray) -> FloatArray:
+    """Distances (N,) of points `p` (N, 3) to a box of half extents `size` (3,)."""
+    return _beyond(np.abs(p) - size)
+
+
+def ellipsoid(p: FloatArray, size: FloatArray) -> FloatArray:
+    """Distances (N,) of points `p` (N, 3) to an ellipsoid of semi-axes `size` (3,).
+
+    Exact to first order near the surface; the sign is exact everywhere.
+    """
+    level = np.linalg.norm(p / size, axis=1)
+    slope = np.linalg.norm(p / size**2, axis=1)
+    # At the centre level and slope vanish together; the nearest surface is the shortest semi-axis away.
+    safe = np.where(slope > 0, slope, 1.0)
+    return np.asarray(np.where(slope > 0, level * (level - 1) / safe, -size.min()))
+
+
+def half_spaces(vertices: FloatArray) -> FloatArray:
+    """Planes (M, 4) of the convex hull of `vertices` (N, 3): n.x + d <= 0 inside, |n| = 1."""
+    return np.unique(ConvexHull(vertices).equations.round(9), axis=0)
+
+
+def convex(p: FloatArray, planes: FloatArray) -> FloatArray:
+    """Distances (N,) of points `p` (N, 3) to the solid behind `planes` (M, 4).
+
+    Exact inside and in front of faces; too small in front of edges and corners.
+    """
+    return np.asarray((p @ planes[:, :3].T + planes[:, 3]).max(axis=1))
+
+
+def _beyond(excess: FloatArray) -> FloatArray:
+    """Distance to a product of intervals from how far (N, k) each coordinate lies beyond its own."""
+    outside = np.linalg.norm(np.maximum(excess, 0), axis=1)
+    return np.asarray(outside + np.minimum(excess.max(axis=1), 0))
