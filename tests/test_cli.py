@@ -1,0 +1,109 @@
+import json
+
+import numpy as np
+import pytest
+
+from imop import DemonstrationStore
+from imop.cli import main
+from imop.evaluation.trials import Trial, demonstration_for
+
+VERBS = ("run", "collect", "eval", "import", "check", "predict", "tasks")
+POT = "tabletop/lid_off_pot"
+
+
+def imop(*arguments):
+    with pytest.raises(SystemExit) as stopped:
+        main([str(a) for a in arguments])
+    return stopped.value.code
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    path = tmp_path_factory.mktemp("data") / "pots.zarr"
+    store = DemonstrationStore.create(path)
+    store.append(demonstration_for(Trial(POT, 0)))
+    return path
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_explains_itself(verb, capsys):
+    assert imop(verb, "--help") == 0
+    assert verb in capsys.readouterr().out
+
+
+def test_help_lists_the_verbs(capsys):
+    assert imop("--help") == 0
+    out = capsys.readouterr().out
+    assert all(verb in out for verb in VERBS)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("run", "--task", "tabletop/juggle"), "tabletop/lid_off_pot"),
+        (("run", "--task", POT, "--seed", "-4"), "seed"),
+        (("run", "--task", POT, "--variation", "9"), "variation"),
+        (("run", "--task", POT, "--demo", "/nowhere"), "/nowhere"),
+        (("eval", "--suite", "kitchen"), "suite"),
+        (("eval", "--methods", "magic"), "methods"),
+        (("eval", "--tasks", "juggle"), "tasks"),
+        (("eval", "--episodes", "0"), "episodes"),
+        (("check", "/nowhere"), "/nowhere"),
+        (("import", "rlbench", "/nowhere", "/tmp/never.zarr"), "/nowhere"),
+        (("predict", "--demo", "/nowhere", "--query", "/nowhere"), "/nowhere"),
+    ],
+)
+def test_bad_input_is_one_clear_line_and_exit_code_2(arguments, named, capsys):
+    assert imop(*arguments) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("error:") and error.count("\n") == 1 and named in error
+
+
+def test_tasks_lists_the_suite(capsys):
+    assert imop("tasks") == 0
+    out = capsys.readouterr().out
+    assert POT in out and "take the lid off the pot" in out
+
+
+def test_a_successful_run_writes_result_picture_and_video(store, tmp_path, capsys):
+    assert imop("run", "--task", POT, "--demo", store, "--method", "oracle", "--out", tmp_path) == 0
+    out = capsys.readouterr().out
+    assert "success" in out and str(tmp_path / "rollout.mp4") in out.replace("\n", "")
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert result["success"] and result["seed"] == 1 and len(result["steps"]) == 3
+    assert max(step["position_error"] for step in result["steps"]) < 0.01
+    assert (tmp_path / "steps.png").stat().st_size > 10_000
+    assert (tmp_path / "rollout.mp4").stat().st_size > 10_000
+
+
+def test_replay_fails_in_another_scene_with_exit_code_1(store, tmp_path):
+    code = imop("run", "--task", POT, "--demo", store, "--method", "replay", "--out", tmp_path, "--no-video")
+    assert code == 1
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert not result["success"] and result["steps"][0]["position_error"] > 0.02
+
+
+def test_predict_of_the_demonstration_itself_is_exact_for_replay(store, tmp_path):
+    assert imop("predict", "--demo", store, "--query", store, "--method", "replay", "--out", tmp_path) == 0
+    steps = json.loads((tmp_path / "result.json").read_text())["steps"]
+    assert np.allclose([step["position_error"] for step in steps], 0)
+
+
+def test_collect_appends_to_a_store_that_passes_the_check(tmp_path):
+    path = tmp_path / "demos.zarr"
+    for seed in (0, 1):
+        arguments = ("--tasks", "lid_off_pot", "--episodes", 1, "--seed", seed, "--jobs", 1)
+        assert imop("collect", "--out", path, *arguments) == 0
+    first, second = DemonstrationStore.open(path)
+    assert first.task == POT and first.seeds != second.seeds
+    assert imop("check", path) == 0
+
+
+def test_eval_writes_the_same_table_as_json_and_markdown(tmp_path, capsys):
+    arguments = ("--tasks", "lid_off_pot", "--episodes", 2, "--jobs", 1, "--out", tmp_path)
+    assert imop("eval", "--methods", "replay,oracle,expert", *arguments) == 0
+    results = json.loads((tmp_path / "results.json").read_text())
+    assert set(results) == {"suite", "split", "seed", "methods"}
+    for method in ("oracle", "expert"):
+        assert results["methods"][method]["tasks"]["lid_off_pot"] == {"successes": 2, "trials": 2}
+    assert "lid_off_pot" in (tmp_path / "report.md").read_text()
