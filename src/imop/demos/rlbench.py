@@ -7,27 +7,20 @@ positive focal lengths, joint 4 gets Franka's zero.
 import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from imop.demos import unpickle
 from imop.demos.images import read_depth, read_ids, read_rgb
 from imop.demos.keyframes import published_keyframes
+from imop.demos.low_dim import LOW_DIM, Frame, read_frames
 from imop.demos.store import DemonstrationStore
 from imop.errors import CorruptData, InvalidInput
-from imop.geometry.se3 import from_pose7
-from imop.types import Action, CameraView, Demonstration, FloatArray, Keyframe, Observation, as_array
+from imop.types import Action, CameraView, Demonstration, Keyframe, Observation
 
 POLICY_CAMERAS = ("front", "left_shoulder", "right_shoulder", "wrist")
 CAMERAS = (*POLICY_CAMERAS, "overhead")
 
-# RLBench's model of the Panda has the zero of joint 4 turned by 4 degrees against Franka's.
-JOINT_4_OFFSET = 0.0698
-FINGER_STROKE = 0.04
-
-LOW_DIM = "low_dim_obs.pkl"
 _LAYOUT_FOLDER = re.compile(r"(episode\d+|episodes|all_variations|variation\d+)$")
 
 
@@ -77,7 +70,7 @@ def read_episode(path: Path | str, cameras: Sequence[str] = POLICY_CAMERAS) -> D
     unknown = sorted(set(cameras) - set(CAMERAS))
     if unknown or not cameras:
         raise InvalidInput("cameras", f"{unknown or 'empty'}", ", ".join(CAMERAS))
-    frames = _frames(folder / LOW_DIM)
+    frames = read_frames(folder / LOW_DIM)
     keyframes = _keyframes(folder / LOW_DIM, frames)
     _check_folders(folder, cameras, len(frames))
     variation, instructions = _variation(folder)
@@ -92,43 +85,10 @@ def read_episode(path: Path | str, cameras: Sequence[str] = POLICY_CAMERAS) -> D
     return Demonstration(tuple(steps), seen[-1], f"rlbench/{_task(folder)}", variation, instructions)
 
 
-class _Frame:
-    """The numbers of one frame; says which file and which field when one is missing."""
-
-    def __init__(self, path: Path, index: int, fields: dict[str, Any]):
-        self.path, self.index, self.fields = path, index, fields
-
-    def __getitem__(self, name: str) -> Any:
-        value = self.get(name)
-        if value is None:
-            raise CorruptData(self.path, f"frame {self.index} has no {name}", "record it with this field")
-        return value
-
-    def get(self, name: str) -> Any:
-        misc = self.fields.get("misc")
-        return self.fields.get(name, misc.get(name) if isinstance(misc, dict) else None)
-
-    def numbers(self, name: str, shape: tuple[int | None, ...]) -> FloatArray:
-        return as_array(name, self[name], shape)
-
-
-def _frames(path: Path) -> list[_Frame]:
-    record = unpickle.load(path)
-    observations = record.fields.get("_observations") if isinstance(record, unpickle.DemoRecord) else record
-    if not isinstance(observations, list) or not all(
-        isinstance(o, unpickle.ObservationRecord) for o in observations
-    ):
-        raise CorruptData(path, "does not contain a demonstration of RLBench (a Demo of Observations)")
-    return [_Frame(path, i, o.fields) for i, o in enumerate(observations)]
-
-
-def _keyframes(path: Path, frames: list[_Frame]) -> list[int]:
-    try:
-        is_open = np.array([float(frame["gripper_open"]) for frame in frames])
-        velocities = np.array([frame.numbers("joint_velocities", (None,)) for frame in frames])
-        found = published_keyframes(is_open, velocities.reshape(len(frames), -1))
-    except (InvalidInput, TypeError, ValueError) as error:
-        raise CorruptData(path, f"gripper_open or joint_velocities: {error}") from error
+def _keyframes(path: Path, frames: list[Frame]) -> list[int]:
+    is_open = np.array([frame.gripper_open for frame in frames])
+    velocities = np.array([frame.numbers("joint_velocities", (7,)) for frame in frames]).reshape(-1, 7)
+    found = published_keyframes(is_open, velocities)
     if not found:
         raise CorruptData(path, f"a recording of {len(frames)} frame(s) has no keyframe", "record it again")
     return found
@@ -149,29 +109,26 @@ def _check_folders(folder: Path, cameras: Sequence[str], n: int) -> None:
                 raise CorruptData(images, problem)
 
 
-def _observation(folder: Path, frame: _Frame, i: int, step: int, cameras: Sequence[str]) -> Observation:
-    fingers = frame.numbers("gripper_joint_positions", (None,))
-    q = frame.numbers("joint_positions", (7,)).copy()
-    q[3] += JOINT_4_OFFSET
+def _observation(folder: Path, frame: Frame, i: int, step: int, cameras: Sequence[str]) -> Observation:
     return Observation(
         views={camera: _view(folder, frame, i, camera) for camera in cameras},
-        T_world_gripper=_gripper_pose(frame),
-        gripper_opening=float(np.clip(fingers.mean() / FINGER_STROKE, 0.0, 1.0)),
+        T_world_gripper=frame.T_world_gripper,
+        gripper_opening=frame.gripper_opening,
         time_step=step,
-        joint_positions=q,
+        joint_positions=frame.joint_positions,
         joint_velocities=frame.numbers("joint_velocities", (7,)),
     )
 
 
-def _view(folder: Path, frame: _Frame, i: int, camera: str) -> CameraView:
+def _view(folder: Path, frame: Frame, i: int, camera: str) -> CameraView:
     K = frame.numbers(f"{camera}_camera_intrinsics", (3, 3)).copy()
-    T = _rigid(f"{camera}_camera_extrinsics", frame.numbers(f"{camera}_camera_extrinsics", (4, 4)))
+    T = frame.rigid(f"{camera}_camera_extrinsics")
     # Recorded camera frames have x to the image's left and y up, with negative focal lengths: half a turn
     # about the optical axis makes both positive and moves no point.
     if K[0, 0] < 0 and K[1, 1] < 0:
         K[[0, 1], [0, 1]] *= -1
         T = T @ np.diag([-1.0, -1.0, 1.0, 1.0])
-    near, far = float(frame[f"{camera}_camera_near"]), float(frame[f"{camera}_camera_far"])
+    near, far = (frame.number(f"{camera}_camera_{plane}") for plane in ("near", "far"))
     rgb = read_rgb(folder / f"{camera}_rgb" / f"{i}.png")
     depth = read_depth(folder / f"{camera}_depth" / f"{i}.png", near, far)
     masks = folder / f"{camera}_mask"
@@ -182,29 +139,12 @@ def _view(folder: Path, frame: _Frame, i: int, camera: str) -> CameraView:
         raise CorruptData(folder, f"camera {camera}, frame {i}: {error}") from error
 
 
-def _action(frame: _Frame) -> Action:
-    ignore_collisions = frame.get("ignore_collisions")
+def _action(frame: Frame) -> Action:
     return Action(
-        T_world_gripper=_gripper_pose(frame),
-        gripper_open=float(frame["gripper_open"]) > 0.5,
-        allow_collisions=ignore_collisions is not None and bool(np.asarray(ignore_collisions).item()),
+        T_world_gripper=frame.T_world_gripper,
+        gripper_open=frame.gripper_open,
+        allow_collisions=frame.has("ignore_collisions") and frame.number("ignore_collisions") > 0.5,
     )
-
-
-def _gripper_pose(frame: _Frame) -> FloatArray:
-    if frame.get("gripper_matrix") is None:  # recorded by an RLBench older than this field
-        return from_pose7(frame.numbers("gripper_pose", (7,)))
-    return _rigid("gripper_matrix", frame.numbers("gripper_matrix", (4, 4)))
-
-
-def _rigid(name: str, T: FloatArray) -> FloatArray:
-    """`T` with the nearest rotation; rounding is mended here, anything worse is for the caller to refuse."""
-    error = np.abs(T[:3, :3] @ T[:3, :3].T - np.eye(3)).max()
-    if not error < 1e-3 or error < 1e-12 or np.linalg.det(T[:3, :3]) < 0:
-        return T
-    mended = T.copy()
-    mended[:3, :3] = Rotation.from_matrix(T[:3, :3]).as_matrix()
-    return mended
 
 
 def _variation(folder: Path) -> tuple[int, tuple[str, ...]]:

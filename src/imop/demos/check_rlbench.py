@@ -1,0 +1,75 @@
+"""Checks an episode in RLBench's layout: the files themselves, then the demonstration in them."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from imop.demos.check_steps import TipPose, check_demonstration
+from imop.demos.findings import Finding
+from imop.demos.keyframes import pose_keyframes, published_keyframes
+from imop.demos.low_dim import LOW_DIM, Frame, read_frames
+from imop.demos.rlbench import read_episode
+from imop.errors import CorruptData
+from imop.geometry import se3
+
+RLBENCH_TIME_STEP = 0.05
+NEAR_FRAMES = 5
+
+
+def check_episode(folder: Path, cameras: Sequence[str], tip_pose: TipPose | None = None) -> Iterator[Finding]:
+    """Everything that looks wrong in one episode folder; the last finding may be what makes it unreadable."""
+    present = [c for c in cameras if all((folder / f"{c}_{kind}").is_dir() for kind in ("rgb", "depth"))]
+    for camera in cameras:
+        if camera not in present:
+            problem = f"the rgb or the depth images of camera {camera} are missing"
+            remedy = "restore them, or leave this camera out everywhere"
+            yield Finding("error", f"{folder}, camera {camera}", problem, remedy)
+    try:
+        frames = read_frames(folder / LOW_DIM)
+        yield from _poses(frames, str(folder / LOW_DIM))
+        yield from _rests(frames, str(folder / LOW_DIM))
+        if present:
+            yield from check_demonstration(read_episode(folder, present), str(folder), tip_pose)
+    except CorruptData as error:
+        yield Finding("error", str(error.path), error.problem, error.remedy)
+
+
+def _poses(frames: list[Frame], where: str) -> Iterator[Finding]:
+    """gripper_pose and gripper_matrix say the same twice, so a wrong one shows."""
+    if not all(frame.has("gripper_matrix") and frame.has("gripper_pose") for frame in frames):
+        return
+    here = f"{where}, gripper_pose"
+    pose7 = np.array([frame.numbers("gripper_pose", (7,)) for frame in frames])
+    matrices = np.array([frame.rigid("gripper_matrix") for frame in frames])
+    length = np.linalg.norm(pose7[:, 3:], axis=1)
+    if np.abs(length - 1).max() > 1e-2:
+        problem = f"a quaternion has length {length[np.abs(length - 1).argmax()]:.3g}"
+        yield Finding("error", here, problem, "give x y z and a unit quaternion x y z w")
+        return
+    poses = se3.from_pose7(pose7)
+    if se3.translation_distance(poses, matrices).max() > 1e-3:
+        problem = "the position differs from gripper_matrix"
+        yield Finding("error", here, problem, "give both in metres, of the same moment")
+    if se3.rotation_distance(poses, matrices).max() > 1e-2:
+        problem, remedy = "the rotation differs from gripper_matrix", "record both at the same moment"
+        wxyz = se3.from_pose7(pose7[:, [0, 1, 2, 4, 5, 6, 3]])
+        if se3.rotation_distance(wxyz, matrices).max() < 1e-2:
+            problem, remedy = "the quaternion is in the order w x y z", "reorder it to x y z w"
+        yield Finding("error", here, problem, remedy)
+
+
+def _rests(frames: list[Frame], where: str) -> Iterator[Finding]:
+    """Keyframes by the gripper's path that joint velocities do not show."""
+    T = np.array([frame.T_world_gripper for frame in frames])
+    is_open = np.array([frame.gripper_open for frame in frames])
+    velocities = np.array([frame.numbers("joint_velocities", (7,)) for frame in frames])
+    opening = np.array([frame.gripper_opening for frame in frames])
+    times = np.arange(len(frames), dtype=np.float64) * RLBENCH_TIME_STEP
+    found = published_keyframes(is_open, velocities)
+    for i in pose_keyframes(T, opening, times):
+        near = [j for j in found if abs(i - j) <= NEAR_FRAMES]
+        if not near:
+            problem = f"the gripper rests at frame {i}, but no keyframe is near: they are {found}"
+            remedy = "check that joint_velocities are in rad/s; else a keyframe is missing"
+            yield Finding("warning", f"{where}, joint_velocities", problem, remedy)

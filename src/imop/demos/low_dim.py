@@ -1,0 +1,98 @@
+"""The numbers of a recorded RLBench episode, frame by frame: what low_dim_obs.pkl contains."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from imop.demos import unpickle
+from imop.errors import CorruptData, InvalidInput
+from imop.geometry.se3 import from_pose7
+from imop.types import FloatArray, as_array
+
+LOW_DIM = "low_dim_obs.pkl"
+
+FINGER_STROKE = 0.04
+
+# RLBench's model of the Panda has the zero of joint 4 turned by 4 degrees against Franka's.
+JOINT_4_OFFSET = 0.0698
+
+
+class Frame:
+    """One moment; every read of a missing or malformed field is a CorruptData that names it."""
+
+    def __init__(self, path: Path, index: int, fields: dict[str, Any]):
+        misc = fields.get("misc")
+        self.path, self.index = path, index
+        self._fields = {**misc, **fields} if isinstance(misc, dict) else fields
+
+    def has(self, name: str) -> bool:
+        """Whether the field was recorded."""
+        return self._fields.get(name) is not None
+
+    def number(self, name: str) -> float:
+        """A field that is one number."""
+        return float(self.numbers(name, ()))
+
+    def numbers(self, name: str, shape: tuple[int | None, ...]) -> FloatArray:
+        """A field that is an array of `shape`, where None means any length."""
+        if not self.has(name):
+            raise CorruptData(self.path, f"frame {self.index} has no {name}", "record it with this field")
+        try:
+            return as_array(name, self._fields[name], shape)
+        except InvalidInput as error:
+            raise CorruptData(self.path, f"frame {self.index}: {error}") from error
+
+    @property
+    def gripper_open(self) -> bool:
+        """RLBench's own decision whether the gripper is open."""
+        return self.number("gripper_open") > 0.5
+
+    @property
+    def gripper_opening(self) -> float:
+        """0 closed .. 1 open."""
+        fingers = self.numbers("gripper_joint_positions", (None,))
+        return float(np.clip(fingers.mean() / FINGER_STROKE, 0.0, 1.0))
+
+    @property
+    def joint_positions(self) -> FloatArray:
+        """(7,) radians in Franka's convention."""
+        q = self.numbers("joint_positions", (7,)).copy()
+        q[3] += JOINT_4_OFFSET
+        return q
+
+    @property
+    def T_world_gripper(self) -> FloatArray:
+        """(4, 4); recordings by old versions of RLBench have only the quaternion."""
+        if not self.has("gripper_matrix"):
+            return from_pose7(self.numbers("gripper_pose", (7,)))
+        return self.rigid("gripper_matrix")
+
+    def rigid(self, name: str) -> FloatArray:
+        """A (4, 4) field with the nearest rotation: rounding is mended, anything worse is not touched."""
+        T = self.numbers(name, (4, 4))
+        error = np.abs(T[:3, :3] @ T[:3, :3].T - np.eye(3)).max()
+        if not 1e-12 < error < 1e-3 or np.linalg.det(T[:3, :3]) < 0:
+            return T
+        mended = T.copy()
+        mended[:3, :3] = Rotation.from_matrix(T[:3, :3]).as_matrix()
+        return mended
+
+
+def read_frames(path: Path) -> list[Frame]:
+    """All frames of an episode.
+
+    Args:
+        path: the file low_dim_obs.pkl.
+
+    Raises:
+        CorruptData: if it is missing, damaged, unsafe, or something else than a demonstration.
+    """
+    record = unpickle.load(path)
+    observations = record.fields.get("_observations") if isinstance(record, unpickle.DemoRecord) else record
+    if not isinstance(observations, list) or not all(
+        isinstance(o, unpickle.ObservationRecord) for o in observations
+    ):
+        raise CorruptData(path, "does not contain a demonstration of RLBench (a Demo of Observations)")
+    return [Frame(path, i, o.fields) for i, o in enumerate(observations)]
