@@ -1,4 +1,7 @@
-"""The embedded suite: procedural tasks on a table."""
+"""The embedded suite: procedural tasks on a table.
+
+Networks train on the base tasks and are tested on the novel ones, which share no kind of object with them.
+"""
 
 from imop.tasks.tabletop.lid_off_pot import LidOffPot
 from imop.tasks.tabletop.open_drawer import OpenDrawer
@@ -6,9 +9,17 @@ from imop.tasks.tabletop.rubbish_in_bin import RubbishInBin
 from imop.tasks.tabletop.stack_cubes import StackCubes
 from imop.tasks.task import Task
 
-TABLETOP: dict[str, type[Task]] = {
+BASE: dict[str, type[Task]] = {
     "tabletop/open_drawer": OpenDrawer,
     "tabletop/stack_cubes": StackCubes,
+}
+
+NOVEL: dict[str, type[Task]] = {
     "tabletop/lid_off_pot": LidOffPot,
     "tabletop/rubbish_in_bin": RubbishInBin,
 }
+
+CROSS_OBJECT: dict[str, type[Task]] = {}
+"""Demonstrated with one object, tried with another."""
+
+TABLETOP: dict[str, type[Task]] = {**BASE, **NOVEL, **CROSS_OBJECT}
