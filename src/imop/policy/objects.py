@@ -25,10 +25,12 @@ class Objects:
     Attributes:
         cloud: the points above the plane.
         labels: (N,) number of the connected cluster of each point.
+        height: (N,) metres above the plane; 0 if there is none.
     """
 
     cloud: PointCloud
     labels: NDArray[np.int64]
+    height: FloatArray
 
     def __len__(self) -> int:
         return len(self.cloud)
@@ -49,10 +51,12 @@ def find_objects(cloud: PointCloud, gap: float = GAP, smallest: int = 8) -> Obje
     If nothing remains, the whole cloud is one object: then the plane itself is all there is to go by.
     """
     plane = supporting_plane(cloud)
-    above = cloud if plane is None else cloud.select(plane.height(cloud.points) > PLANE_THICKNESS)
+    height = np.zeros(len(cloud)) if plane is None else plane.height(cloud.points)
+    standing = height > (-np.inf if plane is None else PLANE_THICKNESS)
+    above = cloud.select(standing)
     labels = connected(above.points, gap)
     large = np.bincount(labels)[labels] >= smallest if len(labels) else np.zeros(0, dtype=bool)
     if not large.any():
-        return Objects(cloud, np.zeros(len(cloud), dtype=np.int64))
+        return Objects(cloud, np.zeros(len(cloud), dtype=np.int64), height)
     _, renumbered = np.unique(labels[large], return_inverse=True)
-    return Objects(above.select(large), renumbered.reshape(-1).astype(np.int64))
+    return Objects(above.select(large), renumbered.reshape(-1).astype(np.int64), height[standing][large])

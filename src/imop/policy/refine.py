@@ -4,6 +4,7 @@ import numpy as np
 import small_gicp
 
 from imop.errors import InvalidInput
+from imop.geometry import se3
 from imop.types import FloatArray
 
 STAGES = (0.04, 0.02, 0.01)
@@ -57,3 +58,13 @@ class Refiner:
                 break
             T = moved
         return T
+
+
+def upright(T: FloatArray, center: FloatArray) -> FloatArray:
+    """The motion (4, 4) with its tilt removed: the turn about the vertical that is nearest, same place for `center`.
+
+    Things that stand on a table in both scenes have not been tilted, however few points say so.
+    """
+    yaw = np.arctan2(T[1, 0] - T[0, 1], T[0, 0] + T[1, 1])
+    R = se3.euler(z=float(yaw))
+    return se3.make(R, T[:3, :3] @ center + T[:3, 3] - R @ center)

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud
@@ -26,8 +25,11 @@ GRASP = 0.04
 # Weight of a point of the region falls with its distance from the contact; scale in metres.
 FADING = 0.15
 LEAST_WEIGHT = 0.2
-# A cluster of fewer points (of a 5 mm grid) fits anywhere; it borrows what lies this near to it, metres.
-ENOUGH = 120
+# Lowest point of something that stands on the plane, metres; what is higher is fixed to something else.
+STANDING = 0.04
+# A cluster of fewer points (of a 5 mm grid) fits anywhere.
+ENOUGH = 30
+# What hangs in the air or is too small is taken with what lies this near to it, metres.
 BORROWING = (0.04, 0.08, 0.16, 0.3)
 
 
@@ -74,22 +76,24 @@ def _region(steps: Sequence[Transition], k: int, objects: Objects, p_gripper_hel
         held = within(objects.cloud.points, se3.apply(T_world_gripper, p_gripper_held), SAME)
         if held.all():
             held[:] = False
-    rest, labels = objects.cloud.select(~held), objects.labels[~held]
-    distance, index = nearest(contact.p_world, rest.points)
-    member = labels == labels[index[np.argmin(distance)]]
-    cloud = rest.select(_with_surroundings(rest.points, labels, member))
+    rest = Objects(objects.cloud.select(~held), objects.labels[~held], objects.height[~held])
+    distance, index = nearest(contact.p_world, rest.cloud.points)
+    member = rest.labels == rest.labels[index[np.argmin(distance)]]
+    in_hand = not _is_open(steps[k]) and not exclude_held
+    cloud = rest.cloud.select(member if in_hand else _with_support(rest, member))
     away, _ = nearest(cloud.points, contact.p_world)
     weight = np.maximum(np.exp(-0.5 * (away[:, 0] / FADING) ** 2), LEAST_WEIGHT)
     return Region(cloud, weight, p_gripper_held if held.any() else np.zeros((0, 3)))
 
 
-def _with_surroundings(points: FloatArray, labels: NDArray[np.int64], member: BoolArray) -> BoolArray:
-    """(N,) the cluster, and if it is too small to be found again the clusters around it, until it is not."""
+def _with_support(objects: Objects, member: BoolArray) -> BoolArray:
+    """(N,) the cluster, with the clusters around it if it hangs in the air: it must be fixed to one of them."""
+    points = objects.cloud.points
     for reach in BORROWING:
-        if member.sum() >= ENOUGH or member.all():
+        if member.sum() >= ENOUGH and objects.height[member].min() < STANDING:
             break
         near = within(points, points[member], reach)
-        member = np.isin(labels, np.unique(labels[near]))
+        member = np.isin(objects.labels, np.unique(objects.labels[near]))
     return member
 
 

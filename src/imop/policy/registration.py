@@ -13,7 +13,7 @@ from imop.policy.evidence import Evidence
 from imop.policy.hypotheses import distinct, mutual_matches, sample_motions
 from imop.policy.matcher import Hypothesis, Scene, Transition
 from imop.policy.objects import connected, find_objects
-from imop.policy.refine import FINEST, Refiner
+from imop.policy.refine import FINEST, Refiner, upright
 from imop.policy.region import SAME, Region, find_regions
 from imop.types import FloatArray
 
@@ -31,7 +31,8 @@ class RegistrationMatcher:
         color_weight: of colours in the comparison of descriptors.
         turns: upright seeds for every object in the query, spread over a full turn.
         refined: how many seeds are refined by closest points.
-        least_turn: share of its score that a hypothesis loses for half a turn.
+        turn_cost: share of its score that a hypothesis loses for turning half a turn off the demonstrated motion.
+        tilt_cost: share that it loses for turning things upside down.
         seed: of the sampling.
     """
 
@@ -40,7 +41,8 @@ class RegistrationMatcher:
     color_weight: float = 2.0
     turns: int = 24
     refined: int = 12
-    least_turn: float = 0.05
+    turn_cost: float = 0.03
+    tilt_cost: float = 0.4
     seed: int = 0
 
     def prepare(self, steps: Sequence[Transition]) -> list["RegisteredStep"]:
@@ -80,40 +82,44 @@ class RegisteredStep:
         if len(things) < 5:
             return ()
         evidence = Evidence(things, query.observation.views)
-        T_held = query.observation.T_world_gripper @ se3.invert(self._T_world_gripper)
-        seeds = np.concatenate(
-            [
-                np.reshape([*hints, T_held, np.eye(4)], (-1, 4, 4)),
-                self._sampled(things),
-                self._upright(things),
-            ]
-        )
+        T_repeated = query.observation.T_world_gripper @ se3.invert(self._T_world_gripper)
+        always = np.stack([*hints, np.eye(4), T_repeated])
+        seeds = np.concatenate([self._sampled(things), self._upright(things)])
         coarse = self._region.cloud.select(self._coarse)
         weight = self._region.weight[self._coarse]
-        # Every hint is refined, of the other seeds the most promising.
-        lead = len(hints) + 2
-        scores = [evidence.score(coarse, weight, T).score for T in seeds[lead:]]
-        order = lead + np.argsort(-np.asarray(scores), kind="stable")
-        center = self.region.mean(axis=0)
-        chosen = order[distinct(seeds[order], center, keep=self._matcher.refined)]
-        return self._refined(evidence, things, seeds[[*range(lead), *chosen]])
+        scores = [evidence.score(coarse, weight, T).score for T in seeds]
+        order = np.argsort(-np.asarray(scores), kind="stable")
+        chosen = distinct(seeds[order], self.region.mean(axis=0), keep=self._matcher.refined)
+        return self._refined(evidence, things, always, seeds[order[chosen]])
 
-    def _refined(self, evidence: Evidence, things: PointCloud, seeds: FloatArray) -> tuple[Hypothesis, ...]:
+    def _refined(
+        self, evidence: Evidence, things: PointCloud, hints: FloatArray, seeds: FloatArray
+    ) -> tuple[Hypothesis, ...]:
         refine = Refiner(things.points)
         fine = self._region.cloud.select(self._fine)
         weight = self._region.weight[self._fine]
-        found = [evidence.score(fine, weight, refine(fine.points, T)) for T in seeds]
+        found = [evidence.score(fine, weight, T) for T in hints]
+        found += [evidence.score(fine, weight, refine(fine.points, T)) for T in [*hints, *seeds]]
         found.sort(key=lambda hypothesis: -hypothesis.score)
         # The last half millimetre is worth looking for only where it matters.
-        for i, hypothesis in enumerate(found[:FINISHED]):
-            finer = evidence.score(fine, weight, refine(fine.points, hypothesis.T_query_support, FINEST))
-            found[i] = max(hypothesis, finer, key=lambda h: h.score)
-        # Symmetric things have many equal explanations: the one that turns least is the easiest to reach.
-        turned = se3.rotation_distance(np.stack([h.T_query_support for h in found]), np.eye(4)) / np.pi
-        preference = np.array([h.score for h in found]) * (1.0 - self._matcher.least_turn * turned)
-        found = [found[i] for i in np.argsort(-preference, kind="stable")]
+        for hypothesis in found[:FINISHED]:
+            T = refine(fine.points, hypothesis.T_query_support, FINEST)
+            found += [evidence.score(fine, weight, M) for M in (T, upright(T, self.region.mean(axis=0)))]
+        preference = [self._preference(hypothesis, hints[-1]) for hypothesis in found]
+        found = [found[i] for i in np.argsort(-np.asarray(preference), kind="stable")]
         motions = np.stack([hypothesis.T_query_support for hypothesis in found])
         return tuple(found[i] for i in distinct(motions, self.region.mean(axis=0), keep=len(found)))
+
+    def _preference(self, hypothesis: Hypothesis, T_repeated: FloatArray) -> float:
+        """The score, less for turning otherwise than demonstrated and less for tilting what stands on a table.
+
+        Symmetric things have many equal explanations; the one that repeats the demonstrated motion of the
+        gripper from where it is now is the easiest to reach and does not twist what is held.
+        """
+        T = hypothesis.T_query_support
+        turn = float(se3.rotation_distance(T, T_repeated)) / np.pi
+        tilt = float(np.arccos(np.clip(T[2, 2], -1.0, 1.0))) / np.pi
+        return hypothesis.score * (1.0 - self._matcher.turn_cost * turn - self._matcher.tilt_cost * tilt)
 
     def _without_held(self, query: Scene) -> PointCloud:
         cloud = find_objects(query.cloud).cloud
