@@ -137,6 +137,7 @@ class World:
         self.arm_dof = np.array([self.model.joint(name).dofadr[0] for name in ARM_JOINTS])
         self.arm_ctrl = np.array([self.model.actuator(name).id for name in ARM_JOINTS])
         self.finger_qpos = np.array([self.model.joint(name).qposadr[0] for name in FINGER_JOINTS])
+        self.finger_dof = np.array([self.model.joint(name).dofadr[0] for name in FINGER_JOINTS])
         self.finger_ctrl = np.array([self.model.actuator(name).id for name in FINGER_JOINTS])
         self._tip = self.model.site(f"{ROBOT}tip").id
         self.set_robot(PANDA_HOME_Q, 1.0)
@@ -145,7 +146,8 @@ class World:
         """Put the arm at rest at `q` (7,) with the gripper at `opening` (0 closed .. 1 open)."""
         self.data.qpos[self.arm_qpos] = self.data.ctrl[self.arm_ctrl] = q
         self.data.qpos[self.finger_qpos] = self.data.ctrl[self.finger_ctrl] = opening * FINGER_STROKE
-        self.data.qvel[:] = 0
+        self.data.qvel[self.arm_dof] = 0
+        self.data.qvel[self.finger_dof] = 0
         self.forward()
 
     def step(self, n: int = 1) -> None:
