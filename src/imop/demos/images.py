@@ -1,5 +1,6 @@
 """RLBench's PNG images: colours, depth in 24 bits, object handles."""
 
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,10 @@ def read_rgb(path: Path) -> ByteArray:
         CorruptData: if the file is missing, damaged or not an 8 bit RGB image.
     """
     try:
-        with Image.open(path) as image:
+        content = BytesIO(path.read_bytes())
+        with Image.open(content) as image:
+            image.verify()  # decoding alone overlooks damage; it also uses the image up
+        with Image.open(content) as image:
             mode, pixels = image.mode, np.array(image)
     except FileNotFoundError:
         remedy = "restore it: frame 0 and every keyframe are needed"

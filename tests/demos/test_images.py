@@ -1,0 +1,57 @@
+import numpy as np
+import pytest
+from PIL import Image
+
+from imop.demos.images import read_depth, read_ids, read_rgb
+from imop.errors import CorruptData
+
+
+def save(path, codes):
+    pixels = np.stack([codes // 65536, codes // 256 % 256, codes % 256], axis=-1).astype(np.uint8)
+    Image.fromarray(pixels).save(path)
+
+
+def test_depth_is_linear_between_the_planes(tmp_path, rng):
+    codes = rng.integers(0, 2**24 - 1, (20, 30))
+    codes[0, :2] = 0, 2**24 - 2
+    save(tmp_path / "0.png", codes)
+    depth = read_depth(tmp_path / "0.png", 0.01, 4.5)
+    assert depth.dtype == np.float32 and depth.shape == (20, 30)
+    np.testing.assert_allclose(depth, 0.01 + 4.49 * codes / (2**24 - 1), atol=3e-7)
+    assert depth[0, 0] == np.float32(0.01)
+
+
+def test_the_far_plane_is_no_measurement(tmp_path):
+    save(tmp_path / "0.png", np.array([[2**24 - 1, 5]]))
+    depth = read_depth(tmp_path / "0.png", 0.01, 4.5)
+    assert depth[0, 0] == 0 and depth[0, 1] > 0
+
+
+def test_ids_use_all_three_bytes(tmp_path, rng):
+    ids = rng.integers(0, 2**24, (10, 10))
+    pixels = np.stack([ids % 256, ids // 256 % 256, ids // 65536], axis=-1).astype(np.uint8)
+    Image.fromarray(pixels).save(tmp_path / "0.png")
+    read = read_ids(tmp_path / "0.png")
+    assert read.dtype == np.int32
+    np.testing.assert_array_equal(read, ids)
+
+
+def test_truncated(tmp_path, rng):
+    path = tmp_path / "0.png"
+    Image.fromarray(rng.integers(0, 256, (64, 64, 3), dtype=np.uint8)).save(path)
+    content = path.read_bytes()
+    flipped = content[:2000] + bytes([content[2000] ^ 1]) + content[2001:]
+    cut = [content[:n] for n in (0, 4, 40, len(content) // 2, len(content) - 20)]
+    for damaged in (*cut, flipped):
+        path.write_bytes(damaged)
+        with pytest.raises(CorruptData, match="not a readable image") as caught:
+            read_rgb(path)
+        assert caught.value.path == path
+
+
+def test_missing_and_wrong_kind(tmp_path):
+    with pytest.raises(CorruptData, match="missing"):
+        read_rgb(tmp_path / "0.png")
+    Image.fromarray(np.zeros((4, 4), np.uint8)).save(tmp_path / "1.png")
+    with pytest.raises(CorruptData, match="mode L"):
+        read_depth(tmp_path / "1.png", 0.01, 1.0)
