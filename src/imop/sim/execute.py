@@ -11,7 +11,6 @@ from imop.sim.motion import Planner, Trajectory
 from imop.sim.world import World
 from imop.types import Action, FloatArray
 
-_CONTROL_STEPS = 2
 _MAX_SETTLE_PERIODS = 10
 _ARRIVED, _AT_REST = 0.0005, 0.01
 
@@ -45,7 +44,7 @@ def execute(
         action: the goal.
         linear: accept only a straight line of the tip.
         seed: of the motion planner.
-        on_frame: called with the world every 0.05 simulated seconds.
+        on_frame: called with the world every 0.05 simulated seconds of motion.
 
     Raises:
         PlanFailed: if no motion was found; the world has not changed then.
@@ -66,16 +65,16 @@ def execute(
 
 def move(world: World, trajectory: Trajectory, on_frame: OnFrame | None = None) -> None:
     """Follow a trajectory from where the arm is, and wait until the arm rests."""
-    period = world.model.opt.timestep * _CONTROL_STEPS
-    # Each target is held for one period, so it is the one of the period's middle.
+    period = world.model.opt.timestep
+    # Each target is held for one time step, so it is the one of the step's middle.
     times = (np.arange(int(np.ceil(trajectory.duration / period))) + 0.5) * period
     q = _interpolate(times, trajectory.times, trajectory.positions)
     dq = _interpolate(times, trajectory.times, trajectory.velocities)
     ddq = np.gradient(dq, period, axis=0) if len(dq) > 1 else np.zeros_like(dq)
     for i in range(len(q)):
         world.data.ctrl[world.arm_ctrl] = _servo_target(world, q[i], dq[i], ddq[i])
-        world.step(_CONTROL_STEPS)
-        if on_frame is not None and (i + 1) % (PERIOD_STEPS // _CONTROL_STEPS) == 0:
+        world.step()
+        if on_frame is not None and (i + 1) % PERIOD_STEPS == 0:
             on_frame(world)
     world.data.ctrl[world.arm_ctrl] = trajectory.positions[-1]
     _settle(world, trajectory.positions[-1], on_frame)
