@@ -16,7 +16,7 @@ from imop.types import FloatArray
 OVERLAP = 0.001
 """Things at rest sink into each other by less, metres."""
 _SETTLE_STEPS = 150
-_DRIFT, _TILT, _SPEED = 0.004, 0.05, 0.02
+_DRIFT, _TILT, _SPEED = 0.004, 0.05, 0.1
 _CANDIDATES = 12
 
 

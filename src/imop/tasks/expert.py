@@ -73,7 +73,8 @@ def perform(task: Task, world: World, on_frame: OnFrame | None = None) -> Demons
 def _follow(world: World, waypoint: Waypoint, step: int, on_frame: OnFrame | None) -> Keyframe:
     observation = observe(world, time_step=step)
     T_world_object = world.pose(waypoint.frame)
-    plan = Planner(world).plan(waypoint.target(world), waypoint.allow_collisions, waypoint.linear)
+    # Like a policy's actions: straight where possible. Scenes are chosen so that linear waypoints are.
+    plan = Planner(world).plan(waypoint.target(world), waypoint.allow_collisions)
     move(world, plan, on_frame)
     action = Action(world.T_world_gripper, waypoint.gripper_open, waypoint.allow_collisions)
     set_gripper(world, waypoint.gripper_open, on_frame)

@@ -84,7 +84,7 @@ class Task(ABC):
         steps = self.waypoints(world)
         if not all(reachable(world, w.target(world), w.allow_collisions) for w in steps):
             return "a waypoint is out of reach"
-        before = {item.body: world.pose(item.body) for item in self.items()}
+        before = {item.body: world.pose(item.body) for item in (*self.items(), *clutter_items(world))}
         settle(world)
         if not at_rest(world, before) or overlaps(world):
             return "something moves by itself"

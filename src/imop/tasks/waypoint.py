@@ -16,7 +16,7 @@ class Waypoint:
         T_frame_gripper: (4, 4).
         gripper_open: state of the gripper after the motion.
         allow_collisions: whether the motion may touch things.
-        linear: whether the tip has to follow a straight line.
+        linear: whether a scene is fit only if the tip can come here on a straight line.
     """
 
     frame: str

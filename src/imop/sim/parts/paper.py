@@ -9,6 +9,9 @@ from scipy.spatial import ConvexHull
 from imop.sim.parts.shapes import PAPER, Color, part, rgba
 from imop.types import FloatArray
 
+_FOOT = 0.65
+"""Height of the lump's centre above its flat underside, as a fraction of its radius."""
+
 
 def _sphere(count: int) -> FloatArray:
     """`count` points spread evenly over the unit sphere (golden spiral), (count, 3)."""
@@ -22,7 +25,7 @@ def _sphere(count: int) -> FloatArray:
 def crumpled_paper(radius: float, rng: np.random.Generator, color: Color) -> Any:
     """A lump of folds with a flat underside, so that it does not roll; it moves freely.
 
-    Frame: centre of the lump, `0.7 * radius` above the underside.
+    Frame: centre of the lump, `height(radius)` above the underside.
     """
     spec, body = part()
     directions = _sphere(90)
@@ -36,7 +39,8 @@ def crumpled_paper(radius: float, rng: np.random.Generator, color: Color) -> Any
     folds = np.sin(4.0 * directions @ creases.T / np.linalg.norm(creases, axis=1) + phase).mean(axis=1)
     scale = radius * (0.92 + 0.3 * folds + rng.uniform(-0.07, 0.07, size=len(directions)))
     points = directions * np.clip(scale, 0.72 * radius, 1.05 * radius)[:, None]
-    points[:, 2] = np.maximum(points[:, 2], -0.7 * radius)
+    foot = (directions[:, 2] < -_FOOT) | (points[:, 2] < -_FOOT * radius)
+    points[foot, 2] = -_FOOT * radius
     spec.add_mesh(name="lump", uservert=points.ravel(), userface=faces.astype(np.int32).ravel())
     body.add_geom(
         type=mujoco.mjtGeom.mjGEOM_MESH,
@@ -46,3 +50,8 @@ def crumpled_paper(radius: float, rng: np.random.Generator, color: Color) -> Any
         friction=[1, 0.02, 1e-3],
     )
     return spec
+
+
+def height(radius: float) -> float:
+    """Of the frame of a lump of `radius` above the table."""
+    return _FOOT * radius

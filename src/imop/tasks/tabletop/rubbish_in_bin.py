@@ -8,7 +8,7 @@ import numpy as np
 
 from imop.geometry import se3
 from imop.sim.parts.bin import waste_bin
-from imop.sim.parts.paper import crumpled_paper
+from imop.sim.parts.paper import crumpled_paper, height
 from imop.sim.parts.shapes import add_to
 from imop.sim.parts.solids import trinket
 from imop.sim.world import World
@@ -53,7 +53,7 @@ class RubbishInBin(Task):
     def items(self) -> Sequence[Item]:
         return [
             Item("bin/body", ((0, 0, self.top_radius + 0.01),), self.bin_height),
-            Item("paper/body", ((0, 0, _ROOM),), 0.7 * self.paper_radius),
+            Item("paper/body", ((0, 0, _ROOM),), height(self.paper_radius)),
             Item("tomato0/body", ((0, 0, 0.03),)),
             Item("tomato1/body", ((0, 0, 0.03),)),
         ]
