@@ -1,5 +1,6 @@
 """A demonstration as plain attributes and stacked arrays, and back: what one episode of a store contains."""
 
+import zlib
 from collections.abc import Mapping
 from typing import Any
 
@@ -32,7 +33,7 @@ class _Columns:
 def pack(demonstration: Demonstration) -> tuple[Attributes, Arrays]:
     """Everything that `unpack` needs: attributes that JSON can hold, and arrays whose first axis counts rows.
 
-    The attribute "arrays" lists shape and type of every array.
+    The attribute "arrays" lists shape, type and checksum of every array.
 
     Raises:
         InvalidInput: if an action carries a match: predictions are not stored.
@@ -50,8 +51,16 @@ def pack(demonstration: Demonstration) -> tuple[Attributes, Arrays]:
         "keyframes": [_pack_step(k, columns) for k in demonstration.keyframes],
     }
     arrays = {key: np.stack(rows) for key, rows in columns.columns.items()}
-    attributes["arrays"] = {key: [list(a.shape), a.dtype.name] for key, a in arrays.items()}
+    attributes["arrays"] = {
+        key: {"shape": list(a.shape), "dtype": a.dtype.name, "crc32": checksum(a)}
+        for key, a in arrays.items()
+    }
     return attributes, arrays
+
+
+def checksum(array: NDArray[Any]) -> int:
+    """CRC-32 of the array's bytes."""
+    return zlib.crc32(np.ascontiguousarray(array).data)
 
 
 def _pack_observation(observation: Observation, columns: _Columns) -> Attributes:

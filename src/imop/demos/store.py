@@ -16,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 import zarr
 from numpy.typing import NDArray
-from zarr.codecs import BloscCodec, Crc32cCodec
+from zarr.codecs import BloscCodec
 
 from imop.demos import episode
 from imop.errors import CorruptData, InvalidInput
@@ -96,7 +96,8 @@ class DemonstrationStore:
             raise IndexError(f"episode {index} of a store of {n}")
         group, arrays = self._verified(index % n)
         where = f"{self.path}/{group.basename}"
-        stacked = {name: _read(f"{where}/{name}", array) for name, array in arrays.items()}
+        declared = cast(Any, group.attrs["arrays"])
+        stacked = {name: _read(f"{where}/{name}", a, declared[name]["crc32"]) for name, a in arrays.items()}
         try:
             return episode.unpack(dict(group.attrs), stacked)
         except (KeyError, IndexError, TypeError, ValueError) as error:  # InvalidInput is a ValueError
@@ -139,26 +140,34 @@ class DemonstrationStore:
         where = f"{self.path}/{_name(index)}"
         try:
             group = zarr.open_group(self._group.store, path=_name(index), mode="r")
-            arrays = dict(group.arrays())
-            actual = {name: [list(a.shape), a.dtype.name] for name, a in arrays.items()}
             declared = dict(cast(Any, group.attrs["arrays"]))
         except Exception as error:  # damaged JSON fails in many ways
             raise CorruptData(where, f"the episode's description is unreadable ({error!r})") from error
-        for name in sorted({*declared, *actual}):
-            if declared.get(name) != actual.get(name):
-                problem = f"is {actual.get(name, 'missing')}, was written as {declared.get(name, 'nothing')}"
-                raise CorruptData(f"{where}/{name}", problem)
-        return group, arrays
+        return group, {name: _described(group, f"{where}/{name}", name, declared[name]) for name in declared}
 
 
-def _read(where: str, array: "zarr.Array[Any]") -> NDArray[Any]:
+def _described(group: zarr.Group, where: str, name: str, declared: Any) -> "zarr.Array[Any]":
+    """The array `name`, if it has the shape and type that it was written with."""
     try:
-        # Zarr reads a chunk whose file is gone as zeros.
-        if array.nchunks_initialized != array.nchunks:
-            raise FileNotFoundError("a file of the array is missing")
-        return np.asarray(array[...])
+        array = cast("zarr.Array[Any]", group[name])
+        actual = {"shape": list(array.shape), "dtype": array.dtype.name}
+        wanted = {key: declared[key] for key in actual}
+    except Exception as error:  # as above
+        raise CorruptData(where, f"the array's description is missing or unreadable ({error!r})") from error
+    if actual != wanted:
+        raise CorruptData(where, f"is {actual}, was written as {wanted}")
+    return array
+
+
+def _read(where: str, array: "zarr.Array[Any]", checksum: int) -> NDArray[Any]:
+    try:
+        content = np.asarray(array[...])
     except Exception as error:  # each codec has its own ways to say that bytes are missing or wrong
         raise CorruptData(where, f"the data cannot be read ({error})") from error
+    # Not left to the codecs: Zarr reads a missing or empty file as zeros.
+    if episode.checksum(content) != checksum:
+        raise CorruptData(where, "the data are not what was written (the checksum differs)")
+    return content
 
 
 def _name(index: int) -> str:
@@ -185,8 +194,7 @@ def _write(folder: Path, attributes: episode.Attributes, arrays: episode.Arrays)
             chunks=(1, *array.shape[1:]) if is_image else array.shape,
             shards=array.shape if is_image else None,
             chunk_key_encoding={"name": "default", "separator": "."},
-            compressors=[BloscCodec(cname="zstd", clevel=5, shuffle="shuffle"), Crc32cCodec()],
-            config={"write_empty_chunks": True},
+            compressors=BloscCodec(cname="zstd", clevel=5, shuffle="shuffle"),
         )
     for file in folder.rglob("*"):
         if file.is_file():
