@@ -10,7 +10,13 @@ from scipy.spatial import cKDTree
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud
 from imop.policy.matcher import Hypothesis
-from imop.types import BoolArray, CameraView, FloatArray
+from imop.types import BoolArray, CameraView, Float32Array, FloatArray
+
+
+def shades(colors: Float32Array) -> FloatArray:
+    """Colours (N, 3) of 0 .. 1 as (N, 4) hue and a little brightness: light falls otherwise on a turned face."""
+    bright = colors.mean(axis=1, keepdims=True).astype(np.float64)
+    return np.concatenate([(colors - bright) / (bright + 0.05), 0.35 * bright], axis=1)
 
 
 @dataclass(frozen=True)
@@ -20,14 +26,14 @@ class Tolerances:
     Attributes:
         reach: farthest counterpart, metres; about twice the spacing of the pixels on the scene.
         offset: standard deviation of the distance from the counterpart's tangent plane, metres.
-        color: standard deviation of a colour's difference, 0 .. 1.
+        color: standard deviation of the difference of two shades, see `shades`.
         depth: how far behind a point a camera must see to prove it absent, metres.
         hidden: what a point that no camera can see costs, as a share of an unexplained one.
     """
 
     reach: float = 0.015
     offset: float = 0.005
-    color: float = 0.15
+    color: float = 0.25
     depth: float = 0.02
     hidden: float = 0.5
 
@@ -42,6 +48,7 @@ class Evidence:
         self._views = views
         self._tolerances = tolerances or Tolerances()
         self._tree = cKDTree(cloud.points) if len(cloud) else None
+        self._shades = shades(cloud.colors)
 
     def score(self, region: PointCloud, weight: FloatArray, T_query_support: FloatArray) -> Hypothesis:
         """The motion as a hypothesis: its score is the weighted share of the region that is explained.
@@ -74,7 +81,7 @@ class Evidence:
         normals = self.cloud.normals[index]
         offset = np.einsum("mk,mk->m", normals, points - self.cloud.points[index])
         facing = np.einsum("mk,mk->m", normals, se3.rotate(T_query_support, region.normals))
-        color = np.linalg.norm(region.colors - self.cloud.colors[index], axis=1)
+        color = np.linalg.norm(shades(region.colors) - self._shades[index], axis=1)
         tolerance = self._tolerances
         agreement = np.exp(
             -0.5 * ((offset / tolerance.offset) ** 2 + (color / tolerance.color) ** 2)

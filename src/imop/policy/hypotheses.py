@@ -157,25 +157,16 @@ def confidence(
 ) -> float:
     """How far to trust the first hypothesis, 0 .. 1: its score, less if a rival explains the scene as well.
 
-    A rival only counts if it would send the gripper elsewhere: a symmetric object has many equal explanations
-    that all agree on where to go, up to the half turn that leaves a parallel gripper the same.
+    A rival only counts if it would send the gripper to another place (`distance`, metres) or from another
+    direction (`angle`, radians). A turn about the approach direction alone does not count: that the scene
+    looks the same after it means that the object is symmetric.
     """
     if not hypotheses:
         return 0.0
-    best = hypotheses[0]
-    T_best = best.T_query_support @ T_support_gripper
-    rivals = [h.score for h in hypotheses[1:] if _elsewhere(T_best, h, T_support_gripper, distance, angle)]
-    rival = max(rivals, default=0.0)
-    margin = np.clip((best.score - rival) / max(0.2 * best.score, 1e-9), 0.0, 1.0)
-    return float(np.clip(best.score * (0.4 + 0.6 * margin), 0.0, 1.0))
-
-
-HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
-
-
-def _elsewhere(
-    T_best: FloatArray, other: Hypothesis, T_support_gripper: FloatArray, distance: float, angle: float
-) -> bool:
-    T_other = other.T_query_support @ T_support_gripper
-    turned = min(se3.rotation_distance(T_best, T_other), se3.rotation_distance(T_best, T_other @ HALF_TURN))
-    return bool(se3.translation_distance(T_best, T_other) > distance or turned > angle)
+    T = np.stack([h.T_query_support for h in hypotheses]) @ T_support_gripper
+    away = se3.translation_distance(T, T[0]) > distance
+    lean = np.arccos(np.clip(T[:, :3, 2] @ T[0, :3, 2], -1.0, 1.0)) > angle
+    scores = np.array([h.score for h in hypotheses])
+    best, rival = scores[0], scores[away | lean].max(initial=0.0)
+    margin = np.clip((best - rival) / max(0.2 * best, 1e-9), 0.0, 1.0)
+    return float(np.clip(best * (0.4 + 0.6 * margin), 0.0, 1.0))

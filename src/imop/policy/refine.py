@@ -61,7 +61,7 @@ class Refiner:
 
 
 def upright(T: FloatArray, center: FloatArray) -> FloatArray:
-    """The motion (4, 4) with its tilt removed: the turn about the vertical that is nearest, same place for `center`.
+    """The motion (4, 4) with its tilt removed: the nearest turn about the vertical, same place for `center`.
 
     Things that stand on a table in both scenes have not been tilted, however few points say so.
     """

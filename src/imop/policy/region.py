@@ -87,7 +87,7 @@ def _region(steps: Sequence[Transition], k: int, objects: Objects, p_gripper_hel
 
 
 def _with_support(objects: Objects, member: BoolArray) -> BoolArray:
-    """(N,) the cluster, with the clusters around it if it hangs in the air: it must be fixed to one of them."""
+    """(N,) the cluster, and if it hangs in the air what is around it: it must be fixed to something."""
     points = objects.cloud.points
     for reach in BORROWING:
         if member.sum() >= ENOUGH and objects.height[member].min() < STANDING:

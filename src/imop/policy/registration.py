@@ -19,6 +19,8 @@ from imop.types import FloatArray
 
 # How many of the refined motions get the finest stage too.
 FINISHED = 4
+# Things do not lean: a motion that tilts by this angle (radians) or more is as unlikely as any other tilt.
+TILTED = 0.17
 
 
 @dataclass(frozen=True)
@@ -31,8 +33,8 @@ class RegistrationMatcher:
         color_weight: of colours in the comparison of descriptors.
         turns: upright seeds for every object in the query, spread over a full turn.
         refined: how many seeds are refined by closest points.
-        turn_cost: share of its score that a hypothesis loses for turning half a turn off the demonstrated motion.
-        tilt_cost: share that it loses for turning things upside down.
+        turn_cost: share of its score that a hypothesis loses for half a turn off the demonstrated motion.
+        tilt_cost: share that it loses for tilting things by `TILTED` or more.
         seed: of the sampling.
     """
 
@@ -42,7 +44,7 @@ class RegistrationMatcher:
     turns: int = 24
     refined: int = 12
     turn_cost: float = 0.03
-    tilt_cost: float = 0.4
+    tilt_cost: float = 0.35
     seed: int = 0
 
     def prepare(self, steps: Sequence[Transition]) -> list["RegisteredStep"]:
@@ -103,22 +105,25 @@ class RegisteredStep:
         found.sort(key=lambda hypothesis: -hypothesis.score)
         # The last half millimetre is worth looking for only where it matters.
         for hypothesis in found[:FINISHED]:
-            T = refine(fine.points, hypothesis.T_query_support, FINEST)
-            found += [evidence.score(fine, weight, M) for M in (T, upright(T, self.region.mean(axis=0)))]
+            found.append(
+                evidence.score(fine, weight, refine(fine.points, hypothesis.T_query_support, FINEST))
+            )
+        center = self.region.mean(axis=0)
+        found += [evidence.score(fine, weight, upright(h.T_query_support, center)) for h in found]
         preference = [self._preference(hypothesis, hints[-1]) for hypothesis in found]
         found = [found[i] for i in np.argsort(-np.asarray(preference), kind="stable")]
         motions = np.stack([hypothesis.T_query_support for hypothesis in found])
-        return tuple(found[i] for i in distinct(motions, self.region.mean(axis=0), keep=len(found)))
+        return tuple(found[i] for i in distinct(motions, center, keep=len(found)))
 
     def _preference(self, hypothesis: Hypothesis, T_repeated: FloatArray) -> float:
-        """The score, less for turning otherwise than demonstrated and less for tilting what stands on a table.
+        """The score, less for turning otherwise than demonstrated and for tilting what stands on a table.
 
         Symmetric things have many equal explanations; the one that repeats the demonstrated motion of the
         gripper from where it is now is the easiest to reach and does not twist what is held.
         """
         T = hypothesis.T_query_support
         turn = float(se3.rotation_distance(T, T_repeated)) / np.pi
-        tilt = float(np.arccos(np.clip(T[2, 2], -1.0, 1.0))) / np.pi
+        tilt = min(float(np.arccos(np.clip(T[2, 2], -1.0, 1.0))) / TILTED, 1.0)
         return hypothesis.score * (1.0 - self._matcher.turn_cost * turn - self._matcher.tilt_cost * tilt)
 
     def _without_held(self, query: Scene) -> PointCloud:
