@@ -1,0 +1,1 @@
+"""The paper's networks in plain PyTorch: invariant regions, matching, routing. One network a file."""

@@ -1,0 +1,226 @@
+"""The matching network: which point of a new state is which point of the invariant region?
+
+Paper, section III-C1: cross attention between the region's graph and the query's, dual softmax. After every
+layer the region is carried to where the matches so far say it is (the repositioning of Lepard, Li and Harada,
+CVPR 2022), so that the next layer may look at who is near.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal
+
+import torch
+from torch import Tensor, nn
+
+from imop.geometry.procrustes import weighted_procrustes
+from imop.networks.backbone import Backbone, BackboneConfig, level_relations
+from imop.networks.blocks import MLP, RELATION, UNIT, DenseBlock, GraphBlock, pad, relation
+from imop.networks.graph import Graph
+
+
+@dataclass(frozen=True)
+class MatchingConfig:
+    """Shape of the matching network.
+
+    Attributes:
+        backbone: shared by the support and the query state.
+        layers: rounds of attention, each with a correspondence matrix.
+        attention: "global" attends from every region point to every query point; "graph" to the `neighbours`
+            most alike at first, and nearest once the region was carried over.
+        neighbours: K of the cross graph.
+        heads: of the dense attention.
+        max_region: points of the region that are matched.
+    """
+
+    backbone: BackboneConfig = field(default_factory=BackboneConfig)
+    layers: int = 3
+    attention: Literal["graph", "global"] = "global"
+    neighbours: int = 8
+    heads: int = 4
+    max_region: int = 160
+
+
+@dataclass(frozen=True, eq=False)
+class Correspondence:
+    """Correspondence matrices of a batch, padded.
+
+    Attributes:
+        layers: (B, R, Q) confidence in [0, 1] after each layer: softmax over rows times softmax over columns.
+        p_region: (B, R, 3) metres, world frame of the demonstration.
+        p_query: (B, Q, 3) metres, world frame of the query.
+        region: (B, R) True where there is a region point.
+        query: (B, Q) True where there is a query point.
+    """
+
+    layers: list[Tensor]
+    p_region: Tensor
+    p_query: Tensor
+    region: Tensor
+    query: Tensor
+
+    @property
+    def last(self) -> Tensor:
+        """(B, R, Q) the matrix of the last layer."""
+        return self.layers[-1]
+
+
+class MatchingNetwork(nn.Module):
+    """Support state with a region, and a query state -> correspondence matrices."""
+
+    def __init__(self, config: MatchingConfig):
+        super().__init__()
+        self.config = config
+        self.backbone = Backbone(config.backbone)
+        width = config.backbone.widths[0]
+        groups = width // config.backbone.group_width
+
+        def each(make: Callable[..., nn.Module], *arguments: int) -> nn.ModuleList:
+            return nn.ModuleList(make(*arguments) for _ in range(config.layers))
+
+        self.region_self = each(DenseBlock, width, config.heads)
+        self.region_bias = each(MLP, RELATION, 16, config.heads)
+        self.query_self = each(GraphBlock, width, groups)
+        if config.attention == "global":
+            self.region_cross = each(DenseBlock, width, config.heads, True)
+            self.query_cross = each(DenseBlock, width, config.heads, True)
+            self.near_bias = each(MLP, 3, 16, config.heads)
+        else:
+            self.region_cross = each(GraphBlock, width, groups, True)
+            self.query_cross = each(GraphBlock, width, groups, True)
+        self.project = each(nn.Linear, width, width)
+        self.log_scale = nn.Parameter(torch.full((config.layers,), 1.0))
+
+    def forward(self, support: Graph, region: Tensor, query: Graph) -> Correspondence:
+        """Match.
+
+        Args:
+            support: s_i, a batch.
+            region: (R,) indices of the region's points in `support`, cloud after cloud, at least one in each.
+            query: s_j, as many clouds.
+        """
+        size = support.size
+        cloud = support.cloud[region]
+        features = self.backbone(support)[region]
+        x, region_present = pad(features, cloud, size)
+        p_x, _ = pad(support.points[region], cloud, size)
+        n_x, _ = pad(support.levels[0].normals[region], cloud, size)
+        y = self.backbone(query)
+        p_y, query_present = pad(query.points, query.cloud, size)
+        n_y, _ = pad(query.levels[0].normals, query.cloud, size)
+        sides = _Sides(p_x, n_x, region_present, p_y, n_y, query_present)
+        own = relation(p_x[:, :, None], n_x[:, :, None], p_x[:, None], n_x[:, None])
+        r_query = level_relations(query.levels[0])
+
+        matrices: list[Tensor] = []
+        T: Tensor | None = None
+        for k in range(self.config.layers):
+            bias = self.region_bias[k](own).permute(0, 3, 1, 2)
+            x = self.region_self[k](x, _masked(bias, region_present))
+            y = self.query_self[k](y, query.levels[0].neighbours, r_query)
+            y_padded, _ = pad(y, query.cloud, size)
+            cross = self._dense if self.config.attention == "global" else self._graph
+            x, y_padded = cross(k, x, y_padded, sides, T)
+            y = y_padded[query_present]
+            matrices.append(self._match(k, x, y_padded, sides))
+            T = reposition(matrices[-1], sides.p_x, sides.p_y)
+        return Correspondence(matrices, p_x, p_y, region_present, query_present)
+
+    def _match(self, k: int, x: Tensor, y: Tensor, sides: "_Sides") -> Tensor:
+        a, b = self.project[k](x), self.project[k](y)
+        scores = a @ b.mT * (self.log_scale[k].exp() / a.shape[-1] ** 0.5)
+        return dual_softmax(scores, sides.x, sides.y)
+
+    def _dense(
+        self, k: int, x: Tensor, y: Tensor, sides: "_Sides", T: Tensor | None
+    ) -> tuple[Tensor, Tensor]:
+        if T is None:
+            to_y = sides.y[:, None].expand(-1, x.shape[1], -1)
+            to_x = sides.x[:, None].expand(-1, y.shape[1], -1)
+        else:
+            distance = torch.cdist(_moved(T, sides.p_x), sides.p_y) / UNIT
+            near = torch.stack([distance.log1p(), torch.exp(-distance), torch.exp(-distance / 4)], dim=-1)
+            bias = self.near_bias[k](near).permute(0, 3, 1, 2)
+            to_y, to_x = _masked(bias, sides.y), _masked(bias.mT, sides.x)
+        return self.region_cross[k](x, to_y, y), self.query_cross[k](y, to_x, x)
+
+    def _graph(
+        self, k: int, x: Tensor, y: Tensor, sides: "_Sides", T: Tensor | None
+    ) -> tuple[Tensor, Tensor]:
+        """Cross attention over neighbours: alike before the region was carried over, near afterwards."""
+        if T is None:
+            distance = -nn.functional.normalize(x, dim=-1) @ nn.functional.normalize(y, dim=-1).mT
+            p_x, n_x = sides.p_x, sides.n_x
+        else:
+            p_x, n_x = _moved(T, sides.p_x), sides.n_x @ T[:, :3, :3].mT
+            distance = torch.cdist(p_x, sides.p_y)
+        distance = distance.detach()
+        to_y = _nearest(distance.masked_fill(~sides.y[:, None], torch.inf), self.config.neighbours)
+        to_x = _nearest(distance.mT.masked_fill(~sides.x[:, None], torch.inf), self.config.neighbours)
+        known = 0.0 if T is None else 1.0
+        r_y = known * _gathered_relation(p_x, n_x, sides.p_y, sides.n_y, to_y)
+        r_x = known * _gathered_relation(sides.p_y, sides.n_y, p_x, n_x, to_x)
+        moved_x = self.region_cross[k](x.flatten(0, 1), _flat(to_y, y.shape[1]), r_y, y.flatten(0, 1))
+        moved_y = self.query_cross[k](y.flatten(0, 1), _flat(to_x, x.shape[1]), r_x, x.flatten(0, 1))
+        return moved_x.view_as(x), moved_y.view_as(y)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sides:
+    """Padded points, normals and presence of the region (x) and of the query (y)."""
+
+    p_x: Tensor
+    n_x: Tensor
+    x: Tensor
+    p_y: Tensor
+    n_y: Tensor
+    y: Tensor
+
+
+def dual_softmax(scores: Tensor, rows: Tensor, columns: Tensor) -> Tensor:
+    """(B, R, Q) product of the softmaxes over columns and over rows; 0 where a point is missing.
+
+    Args:
+        scores: (B, R, Q).
+        rows: (B, R) True where there is a point.
+        columns: (B, Q) likewise.
+    """
+    # A large negative number, not infinity: a row without any point must not become NaN.
+    over_columns = scores.masked_fill(~columns[:, None], -1e9).softmax(dim=2)
+    over_rows = scores.masked_fill(~rows[:, :, None], -1e9).softmax(dim=1)
+    return over_columns * over_rows * (rows[:, :, None] & columns[:, None])
+
+
+def reposition(matrix: Tensor, p_x: Tensor, p_y: Tensor) -> Tensor:
+    """(B, 4, 4) motion of the region, least squares over each point's best match; no gradient."""
+    with torch.no_grad():
+        weight, best = matrix.max(dim=2)
+        matched = torch.gather(p_y, 1, best[..., None].expand(-1, -1, 3))
+        return weighted_procrustes(p_x, matched, weight).T_y_x
+
+
+def _moved(T: Tensor, p: Tensor) -> Tensor:
+    return p @ T[:, :3, :3].mT + T[:, None, :3, 3]
+
+
+def _masked(bias: Tensor, present: Tensor) -> Tensor:
+    """(B, H, M, N) bias with absent columns (B, N) shut out."""
+    return bias.masked_fill(~present[:, None, None], -1e9)
+
+
+def _nearest(distance: Tensor, k: int) -> Tensor:
+    return distance.topk(min(k, distance.shape[-1]), dim=-1, largest=False).indices
+
+
+def _flat(index: Tensor, length: int) -> Tensor:
+    """(B, M, K) indices within clouds -> (B M, K) indices into the flattened batch."""
+    first = torch.arange(len(index), device=index.device) * length
+    return (index + first[:, None, None]).flatten(0, 1)
+
+
+def _gathered_relation(p: Tensor, n: Tensor, q: Tensor, m: Tensor, index: Tensor) -> Tensor:
+    """(B M, K, RELATION) of points p to their chosen counterparts in q."""
+    flat = _flat(index, q.shape[1])
+    found = relation(
+        p.flatten(0, 1)[:, None], n.flatten(0, 1)[:, None], q.flatten(0, 1)[flat], m.flatten(0, 1)[flat]
+    )
+    return found

@@ -1,0 +1,131 @@
+"""The invariant region network: which points of a demonstrated state is the action fixed to?
+
+Paper, section III-C1: graph self attention within s_i and s_i', graph cross attention between them, a
+point-wise sigmoid over s_i after every stage.
+"""
+
+from dataclasses import dataclass, field
+
+import torch
+from torch import Tensor, nn
+
+from imop.networks.backbone import Backbone, BackboneConfig, level_relations
+from imop.networks.blocks import GraphBlock, relation
+from imop.networks.graph import POINT_FEATURES, Graph
+
+GRIPPER_FEATURES = 16
+
+
+@dataclass(frozen=True)
+class RegionConfig:
+    """Shape of the region network.
+
+    Attributes:
+        backbone: shared by s_i and s_i'; its first width is that of the stages.
+        stages: rounds of self and cross attention, each with a prediction.
+        low_dimensional: whether the gripper's state is among the inputs (the paper's ablation).
+    """
+
+    backbone: BackboneConfig = field(
+        default_factory=lambda: BackboneConfig(inputs=POINT_FEATURES + GRIPPER_FEATURES)
+    )
+    stages: int = 2
+    low_dimensional: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class StepBatch:
+    """A batch of demonstrated steps as tensors.
+
+    Attributes:
+        before: s_i, one cloud per step.
+        after: s_i'.
+        T_world_goal: (B, 4, 4) the action pose T_i.
+        T_world_now: (B, 4, 4) the gripper in s_i.
+        gripper: (B, 2) whether it is open in s_i, and after the action.
+        cross: (M, K) for each point of `before`, its nearest points of `after`.
+        cross_back: (M', K) for each point of `after`, its nearest of `before`.
+    """
+
+    before: Graph
+    after: Graph
+    T_world_goal: Tensor
+    T_world_now: Tensor
+    gripper: Tensor
+    cross: Tensor
+    cross_back: Tensor
+
+    def to(self, device: torch.device | str) -> "StepBatch":
+        """The same batch on a device."""
+        rest = (self.T_world_goal, self.T_world_now, self.gripper, self.cross, self.cross_back)
+        return StepBatch(self.before.to(device), self.after.to(device), *(t.to(device) for t in rest))
+
+
+class RegionNetwork(nn.Module):
+    """Steps -> one logit per point of s_i and stage; the sigmoid of the last is the region."""
+
+    def __init__(self, config: RegionConfig):
+        super().__init__()
+        self.config = config
+        self.backbone = Backbone(config.backbone)
+        width = config.backbone.widths[0]
+        groups = width // config.backbone.group_width
+
+        def blocks(cross: bool) -> nn.ModuleList:
+            return nn.ModuleList(GraphBlock(width, groups, cross) for _ in range(config.stages))
+
+        self.across, self.across_back = blocks(True), blocks(True)
+        self.within, self.within_after = blocks(False), blocks(False)
+        self.heads = nn.ModuleList(
+            nn.Sequential(nn.LayerNorm(width), nn.Linear(width, 1)) for _ in range(config.stages)
+        )
+
+    def forward(self, steps: StepBatch) -> list[Tensor]:
+        """Logits (M,) over the points of s_i, one per stage, the last one the best."""
+        before, after = steps.before, steps.after
+        x = self.backbone(before, self._inputs(before, steps))
+        y = self.backbone(after, self._inputs(after, steps))
+        r_before, r_after = level_relations(before.levels[0]), level_relations(after.levels[0])
+        r_cross = _cross_relations(before, after, steps.cross)
+        r_back = _cross_relations(after, before, steps.cross_back)
+        logits = []
+        for k in range(self.config.stages):
+            # Both directions read the features from before the stage, as in the paper's code.
+            x, y = (
+                self.across[k](x, steps.cross, r_cross, y),
+                self.across_back[k](y, steps.cross_back, r_back, x),
+            )
+            x = self.within[k](x, before.levels[0].neighbours, r_before)
+            y = self.within_after[k](y, after.levels[0].neighbours, r_after)
+            logits.append(self.heads[k](x)[:, 0])
+        return logits
+
+    def _inputs(self, graph: Graph, steps: StepBatch) -> Tensor:
+        gripper = gripper_features(graph, steps)
+        if not self.config.low_dimensional:
+            gripper = torch.zeros_like(gripper)
+        return torch.cat([graph.features, gripper], dim=1)
+
+
+def gripper_features(graph: Graph, steps: StepBatch) -> Tensor:
+    """(M, GRIPPER_FEATURES) each point in the gripper's frames, unchanged by any motion of the whole step.
+
+    Position in the frames of T_i and of the gripper before, each as three bounded coordinates, distance and
+    two nearnesses; the open flags before and after; how far the point is above either gripper.
+    """
+    columns = []
+    for T in (steps.T_world_goal, steps.T_world_now):
+        R, p = T[graph.cloud, :3, :3], T[graph.cloud, :3, 3]
+        local = ((graph.points - p)[:, None] @ R)[:, 0]
+        distance = (local.square().sum(1, keepdim=True) + 1e-8).sqrt()
+        bounded = local / (0.1 + distance)
+        columns += [bounded, distance.log1p(), torch.exp(-distance / 0.03), torch.exp(-distance / 0.12)]
+    rise = graph.points[:, 2] - steps.T_world_goal[graph.cloud, 2, 3]
+    fall = graph.points[:, 2] - steps.T_world_now[graph.cloud, 2, 3]
+    columns += [steps.gripper[graph.cloud], 4 * rise[:, None], 4 * fall[:, None]]
+    return torch.cat(columns, dim=1)
+
+
+def _cross_relations(a: Graph, b: Graph, cross: Tensor) -> Tensor:
+    p, n, q, m = a.points, a.levels[0].normals, b.points, b.levels[0].normals
+    return relation(p[:, None], n[:, None], q[cross], m[cross])
