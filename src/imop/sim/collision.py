@@ -61,6 +61,7 @@ class CollisionChecker:
         m.geom_contype[:] = solid & (active[bodies] | others)
         m.geom_margin[:] = np.where(active[bodies], CLEARANCE, 0.0)
         m.geom_gap[:] = 0.0
+        m.body_margin[:] = np.where(active, CLEARANCE, 0.0)  # the compiler's; the broad phase culls by it
 
     def _near(self, q: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
         """Pairs of bodies (n,), (n,) nearer than the clearance at `q`, and their distances (n,)."""
