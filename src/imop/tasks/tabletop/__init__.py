@@ -5,6 +5,8 @@ Networks train on the base tasks and are tested on the novel ones, which share n
 
 from imop.tasks.tabletop.lid_off_pot import LidOffPot
 from imop.tasks.tabletop.open_drawer import OpenDrawer
+from imop.tasks.tabletop.press_buttons import PressButtons
+from imop.tasks.tabletop.ring_on_peg import RingOnPeg
 from imop.tasks.tabletop.rubbish_in_bin import RubbishInBin
 from imop.tasks.tabletop.stack_cubes import StackCubes
 from imop.tasks.task import Task
@@ -12,6 +14,8 @@ from imop.tasks.task import Task
 BASE: dict[str, type[Task]] = {
     "tabletop/open_drawer": OpenDrawer,
     "tabletop/stack_cubes": StackCubes,
+    "tabletop/ring_on_peg": RingOnPeg,
+    "tabletop/press_buttons": PressButtons,
 }
 
 NOVEL: dict[str, type[Task]] = {
