@@ -17,7 +17,8 @@ ALLOWED = {
     "policy": BASE | {"geometry", "demos", "networks"},
     "sim": BASE | {"geometry"},
     "tasks": BASE | {"geometry", "sim"},
-    "evaluation": BASE | {"geometry", "demos", "networks", "policy", "sim", "tasks"},
+    "training": BASE | {"geometry", "demos", "networks", "sim"},
+    "evaluation": BASE | {"geometry", "demos", "networks", "policy", "training", "sim", "tasks"},
 }
 
 

@@ -1,0 +1,67 @@
+"""Losses: focal and Dice for regions, focal on true pairs for matches, focal for routing."""
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+GAMMA = 2.0
+
+
+def focal(logits: Tensor, target: Tensor) -> Tensor:
+    """Mean binary focal loss of logits (M,) against targets (M,) 0 or 1: -(1 - p)^2 log p of the true class.
+
+    Source: Lin et al., Focal loss for dense object detection, ICCV 2017, without alpha.
+    """
+    truth = torch.where(target > 0.5, logits, -logits)
+    return (torch.sigmoid(-truth) ** GAMMA * F.softplus(-truth)).mean()
+
+
+def dice(logits: Tensor, target: Tensor, cloud: Tensor, size: int, smooth: float = 1.0) -> Tensor:
+    """Mean over clouds of 1 - Dice of sigmoid(logits) (M,) and target (M,).
+
+    Args:
+        logits: of all points.
+        target: 0 or 1.
+        cloud: (M,) number of each point's cloud.
+        size: number of clouds.
+        smooth: added above and below, so that empty clouds are defined.
+    """
+    p = torch.sigmoid(logits)
+
+    def total(values: Tensor) -> Tensor:
+        return values.new_zeros(size).index_add(0, cloud, values)
+
+    overlap = 2 * total(p * target) + smooth
+    return (1 - overlap / (total(p) + total(target) + smooth)).mean()
+
+
+def matching(layers: Sequence[Tensor], targets: Sequence[Sequence[Tensor]]) -> Tensor:
+    """Focal loss of the true pairs, summed over layers, mean over samples.
+
+    Args:
+        layers: (B, R, Q) correspondence matrices.
+        targets: per sample, per right motion: (P, 2) row and column of true pairs.
+
+    Where several motions are right, the one that the matrix agrees with best counts: any of them will do,
+    their average would be none.
+    """
+    losses = []
+    for b, motions in enumerate(targets):
+        seen = [pairs for pairs in motions if len(pairs)]
+        if seen:
+            each = [torch.stack([_pairs(m[b], pairs) for pairs in seen]).min() for m in layers]
+            losses.append(torch.stack(each).sum())
+    return torch.stack(losses).mean() if losses else layers[-1].sum() * 0.0
+
+
+def _pairs(matrix: Tensor, pairs: Tensor) -> Tensor:
+    p = matrix[pairs[:, 0], pairs[:, 1]].clamp(1e-6, 1 - 1e-6)
+    return -((1 - p) ** GAMMA * p.log()).mean()
+
+
+def routing(scores: Tensor, step: Tensor) -> Tensor:
+    """Mean focal loss of the true step (B,) under the softmax of scores (B, L)."""
+    log_p = scores.log_softmax(dim=1).gather(1, step[:, None])[:, 0]
+    return -((1 - log_p.exp()) ** GAMMA * log_p).mean()

@@ -1,0 +1,185 @@
+"""One training example: a demonstrated step, a state that calls for the same action, and what is right."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from imop.errors import InvalidInput
+from imop.geometry import se3
+from imop.geometry.cloud import PointCloud
+from imop.geometry.neighbours import nearest
+from imop.networks.graph import Graph, GraphConfig, build_graph, collate, nearest_neighbours
+from imop.networks.region import StepBatch
+from imop.types import BoolArray, FloatArray, as_array, as_pose
+
+# A region point and its counterpart in the query are at most this far apart after the true motion, metres.
+MATCH_RADIUS = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class StepPair:
+    """A step (s_i, T_i, s_i') and a query s_j with s_i = s_j in the sense of the paper.
+
+    Attributes:
+        support: s_i with normals, without the robot.
+        after: s_i'.
+        query: s_j.
+        region: (N,) True for the points of `support` in the invariant region.
+        T_world_goal: (4, 4) the action pose T_i, world frame of the demonstration.
+        T_world_now: (4, 4) the gripper in s_i.
+        gripper_open: whether it is open in s_i, and after the action.
+        T_query_support: (S, 4, 4) every right motion of the region from s_i to s_j, S >= 1: several where the
+            region is symmetric or the query shows equal instances.
+    """
+
+    support: PointCloud
+    after: PointCloud
+    query: PointCloud
+    region: BoolArray
+    T_world_goal: FloatArray
+    T_world_now: FloatArray
+    gripper_open: tuple[bool, bool]
+    T_query_support: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("support", "after", "query"):
+            if not len(getattr(self, name)):
+                raise InvalidInput(name, "empty cloud", "at least one point")
+        region = as_array("region", self.region, (len(self.support),), np.bool_)
+        if not region.any():
+            raise InvalidInput("region", "no point is in it", "at least one True")
+        as_pose("T_world_goal", self.T_world_goal)
+        as_pose("T_world_now", self.T_world_now)
+        for T in as_array("T_query_support", self.T_query_support, (None, 4, 4)):
+            as_pose("T_query_support", T)
+        if not len(self.T_query_support):
+            raise InvalidInput("T_query_support", "no motion", "at least one right motion")
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """A `StepPair` as graphs and targets.
+
+    Attributes:
+        before: s_i.
+        after: s_i'.
+        query: s_j.
+        poses: (2, 4, 4) float32: T_i and the gripper in s_i.
+        gripper: (2,) float32.
+        cross, cross_back: nearest points between s_i and s_i'.
+        region: (M,) float32, 1 in the region, of the finest points of `before`.
+        chosen: (R,) int64, the region points that are matched.
+        targets: for each right motion (P, 2) int64: index into `chosen`, index into the query's points.
+    """
+
+    before: Graph
+    after: Graph
+    query: Graph
+    poses: Tensor
+    gripper: Tensor
+    cross: Tensor
+    cross_back: Tensor
+    region: Tensor
+    chosen: Tensor
+    targets: tuple[Tensor, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class PairBatch:
+    """Samples side by side.
+
+    Attributes:
+        step: what the region network sees.
+        query: s_j, a batch.
+        region: (M,) targets of the region network.
+        chosen: (R,) indices into the finest points of all `step.before`.
+        targets: per sample, per right motion: (P, 2) row and column of the sample's correspondence matrix.
+    """
+
+    step: StepBatch
+    query: Graph
+    region: Tensor
+    chosen: Tensor
+    targets: tuple[tuple[Tensor, ...], ...]
+
+    def to(self, device: torch.device | str) -> "PairBatch":
+        """The same batch on a device."""
+        targets = tuple(tuple(pairs.to(device) for pairs in motions) for motions in self.targets)
+        rest = (self.region.to(device), self.chosen.to(device))
+        return PairBatch(self.step.to(device), self.query.to(device), *rest, targets)
+
+
+def make_sample(pair: StepPair, config: GraphConfig, max_region: int, rng: np.random.Generator) -> Sample:
+    """Graphs and targets of a pair; `rng` chooses which region points are matched if there are too many."""
+    before, after, query = (build_graph(c, config) for c in (pair.support, pair.after, pair.query))
+    p_before, p_after = before.points.numpy().astype(np.float64), after.points.numpy().astype(np.float64)
+    label = pair.region[nearest(p_before, pair.support.points)[1][:, 0]]
+    if not label.any():
+        # The region is smaller than the grid: its nearest point stands for it.
+        label[nearest(pair.support.points[pair.region], p_before)[1][0, 0]] = True
+    chosen = np.flatnonzero(label)
+    if len(chosen) > max_region:
+        chosen = np.sort(rng.choice(chosen, max_region, replace=False))
+    poses = np.stack([pair.T_world_goal, pair.T_world_now]).astype(np.float32)
+    k = config.neighbours
+    return Sample(
+        before,
+        after,
+        query,
+        torch.from_numpy(poses),
+        torch.tensor(pair.gripper_open, dtype=torch.float32),
+        torch.from_numpy(nearest_neighbours(p_before, p_after, k)),
+        torch.from_numpy(nearest_neighbours(p_after, p_before, k)),
+        torch.from_numpy(label.astype(np.float32)),
+        torch.from_numpy(chosen),
+        match_targets(p_before[chosen], query, pair.T_query_support),
+    )
+
+
+def match_targets(p_region: FloatArray, query: Graph, T_query_support: FloatArray) -> tuple[Tensor, ...]:
+    """For each right motion (S, 4, 4) its pairs (P, 2): region point, query point nearest to where it goes.
+
+    Points without a query point nearer than `MATCH_RADIUS` are hidden and have no pair. A motion that hides
+    the whole region is left out, unless all do; then its pairs are empty.
+    """
+    p_query = query.points.numpy().astype(np.float64)
+    found = []
+    for T in T_query_support:
+        distance, index = nearest(se3.apply(T, p_region), p_query)
+        seen = np.flatnonzero(distance[:, 0] < MATCH_RADIUS)
+        found.append(torch.from_numpy(np.stack([seen, index[seen, 0]], axis=1).astype(np.int64)))
+    some = [pairs for pairs in found if len(pairs)]
+    return tuple(some or found[:1])
+
+
+def collate_samples(samples: Sequence[Sample]) -> PairBatch:
+    """One batch of several samples."""
+    before = collate([s.before for s in samples])
+    after = collate([s.after for s in samples])
+    first_before = _starts([len(s.before.points) for s in samples])
+    first_after = _starts([len(s.after.points) for s in samples])
+    poses = torch.stack([s.poses for s in samples])
+    step = StepBatch(
+        before,
+        after,
+        poses[:, 0],
+        poses[:, 1],
+        torch.stack([s.gripper for s in samples]),
+        torch.cat([s.cross + start for s, start in zip(samples, first_after, strict=True)]),
+        torch.cat([s.cross_back + start for s, start in zip(samples, first_before, strict=True)]),
+    )
+    return PairBatch(
+        step,
+        collate([s.query for s in samples]),
+        torch.cat([s.region for s in samples]),
+        torch.cat([s.chosen + start for s, start in zip(samples, first_before, strict=True)]),
+        tuple(s.targets for s in samples),
+    )
+
+
+def _starts(lengths: list[int]) -> NDArray[np.int64]:
+    return np.concatenate([[0], np.cumsum(lengths)[:-1]]).astype(np.int64)

@@ -1,0 +1,97 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from imop.errors import InvalidInput
+from imop.geometry import se3
+from imop.networks.matching import MatchingConfig, MatchingNetwork
+from imop.networks.region import RegionNetwork
+from imop.training import losses
+from imop.training.pairs import MATCH_RADIUS, StepPair, collate_samples, make_sample
+from tests.networks.scenes import SMALL, moved, tabletop
+from tests.networks.test_networks import GOAL, NOW, REGION, TINY
+
+MOTION = se3.make(se3.euler(z=0.7), (0.02, -0.03, 0.0))
+
+
+def pair(seed=0):
+    support = tabletop(seed)
+    region = (support.colors[:, 0] > 0.8) & (support.points[:, 2] > 0.755)
+    return StepPair(
+        support, tabletop(seed + 50), moved(support, MOTION), region, GOAL, NOW, (True, False), MOTION[None]
+    )
+
+
+def sample(pair_, max_region=160):
+    return make_sample(pair_, SMALL, max_region, np.random.default_rng(0))
+
+
+def test_labels_are_those_of_the_cloud():
+    made = sample(pair())
+    red = made.before.features[:, 0] > 0.3
+    torch.testing.assert_close(made.region > 0.5, red)
+    torch.testing.assert_close(made.chosen, torch.nonzero(red)[:, 0])
+
+
+def test_targets_lie_where_the_motion_carries_the_region():
+    made = sample(pair())
+    (pairs,) = made.targets
+    assert len(pairs) > 0.8 * len(made.chosen)
+    p = made.before.points[made.chosen][pairs[:, 0]].numpy()
+    q = made.query.points[pairs[:, 1]].numpy()
+    assert np.linalg.norm(se3.apply(MOTION, p) - q, axis=1).max() <= MATCH_RADIUS + 1e-6
+
+
+def test_a_motion_that_hides_the_region_is_left_out():
+    away = se3.make(p=(0, 0, 1.0))
+    made = sample(replace(pair(), T_query_support=np.stack([away, MOTION])))
+    assert len(made.targets) == 1 and len(made.targets[0])
+    assert len(sample(replace(pair(), T_query_support=away[None])).targets[0]) == 0
+
+
+def test_a_region_smaller_than_the_grid_keeps_a_point():
+    tiny = np.zeros(len(pair().support), dtype=bool)
+    tiny[1000] = True
+    assert len(sample(replace(pair(), region=tiny)).chosen) >= 1
+
+
+def test_the_cap_on_region_points():
+    assert len(sample(pair(), max_region=5).chosen) == 5
+
+
+def test_the_losses_of_a_batch_train_both_networks():
+    batch = collate_samples([sample(pair(0)), sample(pair(1))])
+    torch.manual_seed(0)
+    region, matching = RegionNetwork(REGION), MatchingNetwork(MatchingConfig(TINY, layers=2))
+    parameters = [*region.parameters(), *matching.parameters()]
+    optimizer = torch.optim.Adam(parameters, lr=3e-3)
+    history = []
+    for _ in range(15):
+        logits = region(batch.step)
+        cloud, size = batch.step.before.cloud, batch.step.before.size
+        found = matching(batch.step.before, batch.chosen, batch.query)
+        loss = losses.focal(logits[-1], batch.region) + losses.dice(logits[-1], batch.region, cloud, size)
+        loss = loss + losses.matching(found.layers, batch.targets)
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        history.append(loss.item())
+    assert history[-1] < 0.6 * history[0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "field"),
+    [
+        ({"region": np.zeros(3, dtype=bool)}, "region"),
+        ({"region": np.zeros(len(pair().support), dtype=bool)}, "region"),
+        ({"T_query_support": np.zeros((0, 4, 4))}, "T_query_support"),
+        ({"T_query_support": 2 * np.eye(4)[None]}, "T_query_support"),
+        ({"T_world_goal": np.eye(3)}, "T_world_goal"),
+        ({"query": tabletop().select(np.zeros(0, dtype=int))}, "query"),
+    ],
+)
+def test_bad_pairs_are_refused_by_name(changes, field):
+    with pytest.raises(InvalidInput, match=field):
+        replace(pair(), **changes)
