@@ -8,15 +8,9 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud
+from imop.geometry.cloud import PointCloud, farthest_points
 from imop.policy.matcher import Hypothesis
 from imop.types import BoolArray, CameraView, Float32Array, FloatArray
-
-
-def shades(colors: Float32Array) -> FloatArray:
-    """Colours (N, 3) of 0 .. 1 as (N, 4) hue and a little brightness: light falls otherwise on a turned face."""
-    bright = colors.mean(axis=1, keepdims=True).astype(np.float64)
-    return np.concatenate([(colors - bright) / (bright + 0.05), 0.35 * bright], axis=1)
 
 
 @dataclass(frozen=True)
@@ -26,80 +20,138 @@ class Tolerances:
     Attributes:
         reach: farthest counterpart, metres; about twice the spacing of the pixels on the scene.
         offset: standard deviation of the distance from the counterpart's tangent plane, metres.
-        color: standard deviation of the difference of two shades, see `shades`.
+        shade: standard deviation of the difference of two shades, see `shades`.
         depth: how far behind a point a camera must see to prove it absent, metres.
+        grazing: cosine of the angle to its normal from which a camera sees a face at all.
         hidden: what a point that no camera can see costs, as a share of an unexplained one.
+        around: observed points this near to the moved region have to be explained by it, metres.
+        backward: share of the score that these points decide.
     """
 
     reach: float = 0.015
     offset: float = 0.005
-    color: float = 0.25
+    shade: float = 0.25
     depth: float = 0.02
+    grazing: float = 0.25
     hidden: float = 0.5
+    around: float = 0.04
+    backward: float = 0.25
 
 
-class Evidence:
-    """An observed cloud with normals and the views it came from, ready to judge motions."""
+def shades(colors: Float32Array) -> FloatArray:
+    """Colours (N, 3) of 0 .. 1 as (N, 4) hue and a little brightness, for light changes with a turn."""
+    bright = colors.mean(axis=1, keepdims=True).astype(np.float64)
+    return np.concatenate([(colors - bright) / (bright + 0.05), 0.35 * bright], axis=1)
+
+
+class Surface:
+    """What was observed of a scene or of a part of it: a cloud with normals and the views it came from."""
 
     def __init__(
         self, cloud: PointCloud, views: Mapping[str, CameraView], tolerances: Tolerances | None = None
     ) -> None:
         self.cloud = cloud
-        self._views = views
-        self._tolerances = tolerances or Tolerances()
+        self.tolerances = tolerances or Tolerances()
+        self._views = [(se3.invert(view.T_world_camera), view) for view in views.values()]
         self._tree = cKDTree(cloud.points) if len(cloud) else None
         self._shades = shades(cloud.colors)
 
-    def score(self, region: PointCloud, weight: FloatArray, T_query_support: FloatArray) -> Hypothesis:
-        """The motion as a hypothesis: its score is the weighted share of the region that is explained.
+    def explain(self, cloud: PointCloud, T: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
+        """(M,) how well this surface explains points of a `cloud` with normals moved by `T`, 0 .. 1.
 
-        Args:
-            region: points of the demonstrated scene with normals.
-            weight: (M,) not negative.
-            T_query_support: (4, 4).
+        And (M,) the indices of the counterparts.
         """
-        points = se3.apply(T_query_support, region.points)
-        explained, counterpart = self._explained(points, region, T_query_support)
-        tolerance = self._tolerances
-        hidden = self._hidden(points, tolerance.depth) & (explained < 0.5)
-        possible = weight * np.where(hidden, tolerance.hidden, 1.0)
-        score = float((weight * explained).sum() / max(possible.sum(), 1e-9)) if len(points) else 0.0
-        good = explained > 0.3
-        p_query = self.cloud.points[counterpart[good]]
-        return Hypothesis(T_query_support, min(score, 1.0), region.points[good], p_query)
-
-    def _explained(
-        self, points: FloatArray, region: PointCloud, T_query_support: FloatArray
-    ) -> tuple[FloatArray, NDArray[np.int64]]:
-        """(M,) how well the nearest observed point explains each, 0 .. 1, and (M,) its index."""
-        assert region.normals is not None and self.cloud.normals is not None
+        assert cloud.normals is not None and self.cloud.normals is not None
         if self._tree is None:
-            return np.zeros(len(points)), np.zeros(len(points), dtype=np.int64)
-        distance, index = self._tree.query(points, distance_upper_bound=self._tolerances.reach)
+            return np.zeros(len(cloud)), np.zeros(len(cloud), dtype=np.int64)
+        points = se3.apply(T, cloud.points)
+        distance, index = self._tree.query(points, distance_upper_bound=self.tolerances.reach)
         found = np.isfinite(distance)
         index = np.where(found, index, 0).astype(np.int64)
         normals = self.cloud.normals[index]
         offset = np.einsum("mk,mk->m", normals, points - self.cloud.points[index])
-        facing = np.einsum("mk,mk->m", normals, se3.rotate(T_query_support, region.normals))
-        color = np.linalg.norm(shades(region.colors) - self._shades[index], axis=1)
-        tolerance = self._tolerances
-        agreement = np.exp(
-            -0.5 * ((offset / tolerance.offset) ** 2 + (color / tolerance.color) ** 2)
-        ) * np.clip(facing, 0.0, 1.0)
-        return np.where(found, agreement, 0.0), index
+        facing = np.einsum("mk,mk->m", normals, se3.rotate(T, cloud.normals))
+        shade = np.linalg.norm(shades(cloud.colors) - self._shades[index], axis=1)
+        error = (offset / self.tolerances.offset) ** 2 + (shade / self.tolerances.shade) ** 2
+        agreement = np.where(found, np.exp(-0.5 * error) * np.clip(facing, 0.0, 1.0), 0.0)
+        return agreement, index
 
-    def _hidden(self, points: FloatArray, depth: float) -> BoolArray:
-        """(M,) True where something nearer stands before the point in every view that has it in the image."""
+    def near(self, points: FloatArray) -> BoolArray:
+        """(M,) True for points around this surface."""
+        if self._tree is None:
+            return np.zeros(len(points), dtype=bool)
+        distance, _ = self._tree.query(points, distance_upper_bound=self.tolerances.around)
+        return np.isfinite(distance)
+
+    def hides(self, points: FloatArray, normals: FloatArray) -> BoolArray:
+        """(M,) True where no view can say that a face at the point, with its normal, is not there.
+
+        A view can if the face lies in its image and turns to it, and nothing nearer stands before it.
+        """
         hidden = np.ones(len(points), dtype=bool)
-        for view in self._views.values():
-            p_camera = se3.apply(se3.invert(view.T_world_camera), points)
+        for T_camera_world, view in self._views:
+            p_camera, n_camera = se3.apply(T_camera_world, points), se3.rotate(T_camera_world, normals)
             z = p_camera[:, 2]
-            in_front = z > 1e-3
+            slant = -np.einsum("mk,mk->m", p_camera, n_camera) / np.linalg.norm(p_camera, axis=1)
+            in_front = (z > 1e-3) & (slant > self.tolerances.grazing)
             uvw = p_camera @ view.intrinsics.T
             uv = np.round(uvw[:, :2] / np.where(in_front, z, 1.0)[:, None]).astype(np.int64)
             height, width = view.depth.shape
             inside = in_front & np.all((uv >= 0) & (uv < (width, height)), axis=1)
             u, v = np.where(inside[:, None], uv, 0).T
-            seen = view.measured[v, u] & (view.depth[v, u] > z - depth)
-            hidden &= ~(inside & seen)
+            depth = view.depth[v, u]
+            hidden &= ~(inside & np.isfinite(depth) & (depth > z - self.tolerances.depth))
         return hidden
+
+    def share(self, cloud: PointCloud, weight: FloatArray, T: FloatArray) -> float:
+        """The weighted share 0 .. 1 of the moved `cloud` that is explained; hidden points cost less."""
+        explained, _ = self.explain(cloud, T)
+        open_points = np.flatnonzero(explained < 0.5)
+        possible = weight.copy()
+        doubtful = cloud.select(open_points)
+        assert doubtful.normals is not None
+        hidden = self.hides(se3.apply(T, doubtful.points), se3.rotate(T, doubtful.normals))
+        possible[open_points[hidden]] *= self.tolerances.hidden
+        return float(np.clip((weight * explained).sum() / max(possible.sum(), 1e-9), 0.0, 1.0))
+
+
+class Judge:
+    """Scores motions of one region into one query, in both directions.
+
+    Forward, the observed points have to explain the moved region; backward, the region has to explain what
+    was observed around it, which tells a thing from a larger one and a front with handles from a back.
+
+    Args:
+        region: the region with the views of the demonstrated scene.
+        weight: (M,) of its points.
+        query: the observed scene.
+    """
+
+    def __init__(self, region: Surface, weight: FloatArray, query: Surface) -> None:
+        self._region, self._weight, self._query = region, weight, query
+        self._coarse = farthest_points(region.cloud.points, 120)
+        self._fine = farthest_points(region.cloud.points, 1000)
+        self._around = query.cloud.select(farthest_points(query.cloud.points, 1000))
+
+    def glance(self, T_query_support: FloatArray) -> float:
+        """A quick forward score, 0 .. 1."""
+        coarse = self._region.cloud.select(self._coarse)
+        return self._query.share(coarse, self._weight[self._coarse], T_query_support)
+
+    def judge(self, T_query_support: FloatArray) -> Hypothesis:
+        """The motion as a hypothesis, scored in both directions."""
+        region = self._region.cloud.select(self._fine)
+        forward = self._query.share(region, self._weight[self._fine], T_query_support)
+        T_support_query = se3.invert(T_query_support)
+        around = self._around.select(self._region.near(se3.apply(T_support_query, self._around.points)))
+        backward = self._region.share(around, np.ones(len(around)), T_support_query)
+        part = self._query.tolerances.backward
+        return self._matched((1 - part) * forward + part * backward, T_query_support)
+
+    def _matched(self, score: float, T_query_support: FloatArray) -> Hypothesis:
+        region = self._region.cloud.select(self._fine)
+        explained, counterpart = self._query.explain(region, T_query_support)
+        good = explained > 0.3
+        return Hypothesis(
+            T_query_support, score, region.points[good], self._query.cloud.points[counterpart[good]]
+        )

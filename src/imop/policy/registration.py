@@ -9,7 +9,7 @@ from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, farthest_points, voxel_downsample
 from imop.geometry.features import fpfh
 from imop.geometry.neighbours import within
-from imop.policy.evidence import Evidence
+from imop.policy.evidence import Judge, Surface
 from imop.policy.hypotheses import distinct, mutual_matches, sample_motions
 from imop.policy.matcher import Hypothesis, Scene, Transition
 from imop.policy.objects import connected, find_objects
@@ -40,7 +40,7 @@ class RegistrationMatcher:
 
     spacing: float = 0.01
     radius: float = 0.05
-    color_weight: float = 2.0
+    color_weight: float = 0.2
     turns: int = 24
     refined: int = 12
     turn_cost: float = 0.03
@@ -49,17 +49,17 @@ class RegistrationMatcher:
 
     def prepare(self, steps: Sequence[Transition]) -> list["RegisteredStep"]:
         """Find the regions of a demonstration and describe them."""
-        return [
-            RegisteredStep(self, step, region)
-            for step, region in zip(steps, find_regions(steps), strict=True)
-        ]
+        regions = find_regions(steps)
+        return [RegisteredStep(self, step, region) for step, region in zip(steps, regions, strict=True)]
 
-    def describe(self, cloud: PointCloud) -> tuple[PointCloud, FloatArray]:
-        """The thinned cloud and a descriptor (N, 36) of every point: shape and colour."""
+    def describe(self, cloud: PointCloud, count: int) -> tuple[PointCloud, FloatArray]:
+        """At most `count` points of the cloud and a descriptor (N, 36) of each: shape and colour."""
         sparse = voxel_downsample(cloud, self.spacing)
         assert sparse.normals is not None
         shape = fpfh(sparse.points, sparse.normals, self.radius) / 200.0
-        return sparse, np.concatenate([shape, self.color_weight / 10 * sparse.colors], axis=1)
+        chosen = farthest_points(sparse.points, count)
+        described = np.concatenate([shape[chosen], self.color_weight * sparse.colors[chosen]], axis=1)
+        return sparse.select(chosen), described
 
 
 class RegisteredStep:
@@ -68,10 +68,12 @@ class RegisteredStep:
     def __init__(self, matcher: RegistrationMatcher, step: Transition, region: Region) -> None:
         self._matcher = matcher
         self._region = region
+        self._surface = Surface(region.cloud, step.before.observation.views)
+        self._center = region.cloud.points.mean(axis=0)
         self._T_world_gripper = step.before.observation.T_world_gripper
-        self._sparse, self._descriptors = matcher.describe(region.cloud)
-        self._coarse = farthest_points(region.cloud.points, 150)
-        self._fine = farthest_points(region.cloud.points, 1200)
+        self._keypoints, self._descriptors = matcher.describe(region.cloud, 800)
+        self._coarse = region.cloud.points[farthest_points(region.cloud.points, 400)]
+        self._fine = region.cloud.points[farthest_points(region.cloud.points, 1500)]
 
     @property
     def region(self) -> FloatArray:
@@ -83,37 +85,30 @@ class RegisteredStep:
         things = self._without_held(query)
         if len(things) < 5:
             return ()
-        evidence = Evidence(things, query.observation.views)
+        judge = Judge(self._surface, self._region.weight, Surface(things, query.observation.views))
         T_repeated = query.observation.T_world_gripper @ se3.invert(self._T_world_gripper)
-        always = np.stack([*hints, np.eye(4), T_repeated])
+        likely = np.stack([*hints, np.eye(4), T_repeated])
         seeds = np.concatenate([self._sampled(things), self._upright(things)])
-        coarse = self._region.cloud.select(self._coarse)
-        weight = self._region.weight[self._coarse]
-        scores = [evidence.score(coarse, weight, T).score for T in seeds]
-        order = np.argsort(-np.asarray(scores), kind="stable")
-        chosen = distinct(seeds[order], self.region.mean(axis=0), keep=self._matcher.refined)
-        return self._refined(evidence, things, always, seeds[order[chosen]])
+        order = np.argsort([-judge.glance(T) for T in seeds], kind="stable")
+        chosen = distinct(seeds[order], self._center, keep=self._matcher.refined)
+        motions = self._refined(things, judge, likely, seeds[order[chosen]])
+        preference = [self._preference(hypothesis, T_repeated) for hypothesis in motions]
+        best_first = [motions[i] for i in np.argsort(-np.asarray(preference), kind="stable")]
+        different = distinct(np.stack([h.T_query_support for h in best_first]), self._center, len(best_first))
+        return tuple(best_first[i] for i in different)
 
     def _refined(
-        self, evidence: Evidence, things: PointCloud, hints: FloatArray, seeds: FloatArray
-    ) -> tuple[Hypothesis, ...]:
+        self, things: PointCloud, judge: Judge, likely: FloatArray, seeds: FloatArray
+    ) -> list[Hypothesis]:
+        """The likely motions as they are, all motions refined, and all of these set upright."""
         refine = Refiner(things.points)
-        fine = self._region.cloud.select(self._fine)
-        weight = self._region.weight[self._fine]
-        found = [evidence.score(fine, weight, T) for T in hints]
-        found += [evidence.score(fine, weight, refine(fine.points, T)) for T in [*hints, *seeds]]
+        found = [judge.judge(T) for T in likely]
+        found += [judge.judge(refine(self._coarse, T)) for T in [*likely, *seeds]]
         found.sort(key=lambda hypothesis: -hypothesis.score)
         # The last half millimetre is worth looking for only where it matters.
-        for hypothesis in found[:FINISHED]:
-            found.append(
-                evidence.score(fine, weight, refine(fine.points, hypothesis.T_query_support, FINEST))
-            )
-        center = self.region.mean(axis=0)
-        found += [evidence.score(fine, weight, upright(h.T_query_support, center)) for h in found]
-        preference = [self._preference(hypothesis, hints[-1]) for hypothesis in found]
-        found = [found[i] for i in np.argsort(-np.asarray(preference), kind="stable")]
-        motions = np.stack([hypothesis.T_query_support for hypothesis in found])
-        return tuple(found[i] for i in distinct(motions, center, keep=len(found)))
+        finished = [refine(self._fine, h.T_query_support, FINEST) for h in found[:FINISHED]]
+        found += [judge.judge(T) for T in finished]
+        return found + [judge.judge(upright(h.T_query_support, self._center)) for h in found]
 
     def _preference(self, hypothesis: Hypothesis, T_repeated: FloatArray) -> float:
         """The score, less for turning otherwise than demonstrated and for tilting what stands on a table.
@@ -135,19 +130,19 @@ class RegisteredStep:
 
     def _sampled(self, things: PointCloud) -> FloatArray:
         """(H, 4, 4) motions from matched descriptors."""
-        sparse, descriptors = self._matcher.describe(things)
+        keypoints, descriptors = self._matcher.describe(things, 2500)
         pairs = mutual_matches(self._descriptors, descriptors)
-        x, y = self._sparse.select(pairs.i_support), sparse.select(pairs.i_query)
+        x, y = self._keypoints.select(pairs.i_support), keypoints.select(pairs.i_query)
         assert x.normals is not None and y.normals is not None
-        return sample_motions(x.points, y.points, x.normals, y.normals, pairs.weight, seed=self._matcher.seed)
+        seed = self._matcher.seed
+        return sample_motions(x.points, y.points, x.normals, y.normals, pairs.weight, seed=seed)
 
     def _upright(self, things: PointCloud) -> FloatArray:
         """(H, 4, 4) motions that set the region on the place of every object of the query, in every turn."""
-        center = _middle(self.region)
         labels = connected(things.points)
         places = [_middle(things.points[labels == label]) for label in range(labels.max() + 1)]
         turns = np.linspace(0.0, 2 * np.pi, self._matcher.turns, endpoint=False)
-        return np.stack(list(_about(center, places, turns)))
+        return np.stack(list(_about(_middle(self.region), places, turns)))
 
 
 def _middle(points: FloatArray) -> FloatArray:
