@@ -1,0 +1,82 @@
+"""What a pair may look like without its truth changing."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from imop.geometry import se3
+from imop.geometry.cloud import PointCloud
+from imop.training.pairs import StepPair
+from imop.types import BoolArray, FloatArray
+
+MOVE = 0.15
+TILT = 0.03
+JITTER = 0.001
+KEEP_POINTS = (0.6, 1.0)
+LOSE_VIEW = 0.15
+# Fewer points are not thinned out further.
+ENOUGH = 100
+
+
+def augment(pair: StepPair, rng: np.random.Generator) -> StepPair:
+    """The pair with both scenes moved independently, in other light, and seen less well.
+
+    Both sides turn freely about the vertical, move by up to `MOVE` metres and tilt by up to `TILT` radians;
+    poses, normals and the right motions go with them. Colours change together and a little apart; points and
+    whole views are lost.
+    """
+    A, B = _motion(rng, pair.T_world_goal[:3, 3]), _motion(rng, pair.query.points.mean(axis=0))
+    light = _light(rng, 0.25)
+    support, region = _worse(pair.support, rng, pair.region)
+    after, _ = _worse(pair.after, rng)
+    query, _ = _worse(pair.query, rng)
+    light_query = light @ _light(rng, 0.06)
+    return replace(
+        pair,
+        support=_moved(_lit(support, light), A),
+        after=_moved(_lit(after, light), A),
+        query=_moved(_lit(query, light_query), B),
+        region=region,
+        T_world_goal=A @ pair.T_world_goal,
+        T_world_now=A @ pair.T_world_now,
+        T_query_support=B @ pair.T_query_support @ se3.invert(A),
+    )
+
+
+def _motion(rng: np.random.Generator, center: FloatArray) -> FloatArray:
+    roll, pitch = rng.normal(0, TILT / 2, 2).clip(-TILT, TILT)
+    R = se3.euler(roll, pitch, rng.uniform(-np.pi, np.pi))
+    shift = np.array([*rng.uniform(-MOVE, MOVE, 2), 0.0])
+    return se3.make(R, center + shift - R @ center)
+
+
+def _light(rng: np.random.Generator, strength: float) -> FloatArray:
+    """(3, 3) random gain of each channel with a little mixing between them."""
+    return np.diag(np.exp(rng.normal(0, strength, 3))) @ (np.eye(3) + rng.normal(0, 0.3 * strength, (3, 3)))
+
+
+def _lit(cloud: PointCloud, light: FloatArray) -> PointCloud:
+    return replace(cloud, colors=np.clip(cloud.colors @ light.T, 0, 1).astype(np.float32))
+
+
+def _moved(cloud: PointCloud, T: FloatArray) -> PointCloud:
+    normals = None if cloud.normals is None else se3.rotate(T, cloud.normals)
+    return replace(cloud, points=se3.apply(T, cloud.points), normals=normals)
+
+
+def _worse(
+    cloud: PointCloud, rng: np.random.Generator, region: BoolArray | None = None
+) -> tuple[PointCloud, BoolArray]:
+    """Fewer and noisier points; at least one of the region stays."""
+    inside = np.zeros(len(cloud), dtype=bool) if region is None else region
+    keep = np.ones(len(cloud), dtype=bool)
+    if len(cloud) > ENOUGH:
+        keep = rng.random(len(cloud)) < rng.uniform(*KEEP_POINTS)
+        cameras = np.unique(cloud.camera)
+        if len(cameras) > 1 and rng.random() < LOSE_VIEW:
+            keep &= cloud.camera != rng.choice(cameras)
+        if (region is not None and not (keep & region).any()) or keep.sum() < ENOUGH:
+            keep[:] = True
+    thinner = cloud.select(keep)
+    noisy = thinner.points + rng.normal(0, JITTER, thinner.points.shape)
+    return replace(thinner, points=noisy), inside[keep]

@@ -1,0 +1,50 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from imop.errors import CorruptData
+from imop.training.shards import Shard, write_shard
+from tests.training.test_pairs import pair
+
+
+def test_round_trip(tmp_path):
+    first, second = pair(0), pair(1)
+    shared = replace(second, support=first.support, region=first.region)
+    write_shard([first, shared, second], tmp_path / "a.npz")
+    shard = Shard(tmp_path / "a.npz")
+    assert len(shard) == 3
+    for wrote, read in zip((first, shared, second), (shard[i] for i in range(3)), strict=True):
+        for name in ("support", "after", "query"):
+            a, b = getattr(wrote, name), getattr(read, name)
+            np.testing.assert_allclose(a.points, b.points, atol=1e-6)
+            np.testing.assert_allclose(a.colors, b.colors, atol=0.5 / 255 + 1e-6)
+            np.testing.assert_allclose(a.normals, b.normals, atol=0.02)
+        np.testing.assert_array_equal(wrote.region, read.region)
+        np.testing.assert_allclose(wrote.T_query_support, read.T_query_support)
+        np.testing.assert_allclose(wrote.T_world_goal, read.T_world_goal)
+        np.testing.assert_allclose(wrote.T_world_now, read.T_world_now)
+        assert wrote.gripper_open == read.gripper_open
+
+
+def test_shared_clouds_are_stored_once(tmp_path):
+    write_shard([pair()], tmp_path / "one.npz")
+    one = pair()
+    write_shard([one, replace(one, gripper_open=(False, False))], tmp_path / "two.npz")
+    small, large = ((tmp_path / name).stat().st_size for name in ("one.npz", "two.npz"))
+    assert large < 1.1 * small
+
+
+@pytest.mark.parametrize("damage", [lambda b: b[: len(b) // 2], lambda b: b"", lambda b: b"PK" + b[2:40]])
+def test_a_damaged_shard_is_named(tmp_path, damage):
+    path = tmp_path / "a.npz"
+    write_shard([pair()], path)
+    path.write_bytes(damage(path.read_bytes()))
+    with pytest.raises(CorruptData, match=r"a\.npz"):
+        Shard(path)
+
+
+def test_a_shard_with_pickles_is_refused(tmp_path):
+    np.savez(tmp_path / "a.npz", version=np.array([print], dtype=object))
+    with pytest.raises(CorruptData, match=r"a\.npz"):
+        Shard(tmp_path / "a.npz")
