@@ -5,7 +5,7 @@ a distance between their clouds this does not mind what one sees and the other c
 count as agreement, because a camera that slides along it still sees it in the right place.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 from itertools import permutations
 
@@ -92,18 +92,25 @@ def find_disagreement(observations: Sequence[Views]) -> list[Disagreement]:
     shown = _scenes([observations[0], observations[-1]], THINNED)
     cameras = sorted({camera for scene in shown for camera in scene})
     worst = next(iter(offenders.values()))
-    if len(offenders) > 1 or len(cameras) == 2:
+    alone = [_cure_of_one(shown, camera, offenders) for camera in offenders]
+    # One camera is wrong more often than all; but if all are, any of them can look like the only one.
+    if len(offenders) > 1 or len(cameras) == 2 or alone == [None]:
         common = _cure(shown, cameras)
         if common is not None:
             return [Disagreement(tuple(cameras), worst, common)]
     if len(cameras) == 2:
         cures = [f"{camera}: {cure}" for camera in cameras if (cure := _cure(shown, [camera]))]
         return [Disagreement(tuple(cameras), worst, " or ".join(cures) or None)]
-    found = []
-    for camera, fraction in offenders.items():
-        trusted = [{n: v for n, v in s.items() if n == camera or n not in offenders} for s in shown]
-        found.append(Disagreement((camera,), fraction, _cure(trusted, [camera])))
-    return found
+    return [
+        Disagreement((camera,), fraction, cure)
+        for (camera, fraction), cure in zip(offenders.items(), alone, strict=True)
+    ]
+
+
+def _cure_of_one(scenes: _Scenes, camera: str, offenders: Collection[str]) -> str | None:
+    """What makes `camera` agree with those that are beyond suspicion."""
+    trusted = [{n: v for n, v in s.items() if n == camera or n not in offenders} for s in scenes]
+    return _cure(trusted, [camera])
 
 
 def reordered_quaternion(T: FloatArray) -> tuple[FloatArray, FloatArray]:
