@@ -80,6 +80,7 @@ class OneShotPolicy:
         trust = confidence(hypotheses, demonstrated.T_world_gripper)
         if trust < self._min_confidence or not hypotheses:
             raise NoConfidentMatch(trust, self._min_confidence)
+        self._router.took(number, step)
         best = hypotheses[0]
         self._hints = [best.T_query_support]
         T_world_gripper = _orthonormal(best.T_query_support @ demonstrated.T_world_gripper)

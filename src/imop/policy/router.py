@@ -18,7 +18,11 @@ class Router(Protocol):
         ...
 
     def route(self, query: Scene) -> tuple[int, int]:
-        """Number of the demonstration and of its step that fit the query."""
+        """Number of the demonstration and of its step that fit the query; asking changes nothing."""
+        ...
+
+    def took(self, demonstration: int, step: int) -> None:
+        """The step was found in the scene and its action is being performed."""
         ...
 
 
@@ -26,19 +30,21 @@ class AdvancingRouter:
     """Goes through the first demonstration step by step and then stays at its last."""
 
     def __init__(self) -> None:
-        self._lengths: list[int] = []
+        self._length = 0
         self._next = 0
 
     def watch(self, steps: Sequence[Transition]) -> None:
-        """Remember how many steps there are."""
-        self._lengths.append(len(steps))
+        """Remember how many steps the first demonstration has."""
+        self._length = self._length or len(steps)
 
     def reset(self) -> None:
         """Begin with the first step."""
         self._next = 0
 
     def route(self, query: Scene) -> tuple[int, int]:
-        """The step after the one given last."""
-        step = min(self._next, self._lengths[0] - 1)
-        self._next = step + 1
-        return 0, step
+        """The step after the one taken last."""
+        return 0, self._next
+
+    def took(self, demonstration: int, step: int) -> None:
+        """The following step is next."""
+        self._next = min(step + 1, self._length - 1)
