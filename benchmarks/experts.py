@@ -2,8 +2,8 @@
 
     python benchmarks/experts.py --suite tabletop --seeds 50 --json experts.json
 
-The file has the layout of `imop eval`'s results.json; "failures" adds the seed and reason of each failed scene,
-"seconds" the median and longest wall time of an episode.
+The file has the layout of `imop eval`'s results.json; "failures" adds the seed and reason of each failed
+scene, "seconds" the median and longest wall time of an episode.
 """
 
 import sys
