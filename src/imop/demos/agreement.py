@@ -26,6 +26,7 @@ ACCEPTED = 0.025
 # Fractions of the images: what two cameras must see together to be compared, and to be called in agreement.
 ENOUGH = 0.002
 OVERLAP = 0.03
+SMALLEST_RESCALING = 0.03
 # Every how many points are enough to search for a cure.
 THINNED = 5
 
@@ -198,7 +199,10 @@ def _cure(scenes: _Scenes, cameras: Sequence[str]) -> str | None:
         return sum(c.confirmed - c.contradicted for c in after(change).values())
 
     scale = _best_scale(lambda factor: score(_rescaled(factor)))
-    candidates = [(f"its depth is multiplied by {scale:.3g}", _rescaled(scale)), *_changes_of_pose()]
+    candidates = list(_changes_of_pose())
+    # Within the tolerance a little more or less depth also hides a small displacement.
+    if abs(scale - 1) > SMALLEST_RESCALING:
+        candidates.append((f"its depth is multiplied by {scale:.3g}", _rescaled(scale)))
     words, change = max(candidates, key=lambda candidate: score(candidate[1]))
     cured = after(change)
     # Views that hardly see the same contradict each other little, too.
