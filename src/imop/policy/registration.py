@@ -21,6 +21,8 @@ from imop.types import FloatArray
 FINISHED = 4
 # Things do not lean: a motion that tilts by this angle (radians) or more is as unlikely as any other tilt.
 TILTED = 0.17
+# Farther off (metres) than this is another place.
+ELSEWHERE = 0.03
 
 
 @dataclass(frozen=True)
@@ -33,8 +35,9 @@ class RegistrationMatcher:
         color_weight: of colours in the comparison of descriptors.
         turns: upright seeds for every object in the query, spread over a full turn.
         refined: how many seeds are refined by closest points.
-        turn_cost: share of its score that a hypothesis loses for half a turn off the demonstrated motion.
-        tilt_cost: share that it loses for tilting things by `TILTED` or more.
+        turn: share of its score that a hypothesis loses for half a turn off the demonstrated motion.
+        tilt: share that it loses for tilting things by `TILTED` or more.
+        change: share that it loses for another place than the demonstrated motion leads to.
         seed: of the sampling.
     """
 
@@ -43,8 +46,9 @@ class RegistrationMatcher:
     color_weight: float = 0.2
     turns: int = 24
     refined: int = 12
-    turn_cost: float = 0.03
-    tilt_cost: float = 0.35
+    turn: float = 0.03
+    tilt: float = 0.35
+    change: float = 0.12
     seed: int = 0
 
     def prepare(self, steps: Sequence[Transition]) -> list["RegisteredStep"]:
@@ -92,7 +96,7 @@ class RegisteredStep:
         order = np.argsort([-judge.glance(T) for T in seeds], kind="stable")
         chosen = distinct(seeds[order], self._center, keep=self._matcher.refined)
         motions = self._refined(things, judge, likely, seeds[order[chosen]])
-        preference = [self._preference(hypothesis, T_repeated) for hypothesis in motions]
+        preference = [self._preference(hypothesis, T_repeated, bool(hints)) for hypothesis in motions]
         best_first = [motions[i] for i in np.argsort(-np.asarray(preference), kind="stable")]
         different = distinct(np.stack([h.T_query_support for h in best_first]), self._center, len(best_first))
         return tuple(best_first[i] for i in different)
@@ -110,16 +114,19 @@ class RegisteredStep:
         found += [judge.judge(T) for T in finished]
         return found + [judge.judge(upright(h.T_query_support, self._center)) for h in found]
 
-    def _preference(self, hypothesis: Hypothesis, T_repeated: FloatArray) -> float:
-        """The score, less for turning otherwise than demonstrated and for tilting what stands on a table.
+    def _preference(self, hypothesis: Hypothesis, T_repeated: FloatArray, begun: bool) -> float:
+        """The score, less for moving otherwise than demonstrated and for tilting what stands on a table.
 
         Symmetric things have many equal explanations; the one that repeats the demonstrated motion of the
-        gripper from where it is now is the easiest to reach and does not twist what is held.
+        gripper from where it is now (`T_repeated`) is the easiest to reach and does not twist what is held.
+        Among equal things, the one that was approached (if the episode has `begun`) stays the aim.
         """
-        T = hypothesis.T_query_support
+        T, cost = hypothesis.T_query_support, self._matcher
         turn = float(se3.rotation_distance(T, T_repeated)) / np.pi
         tilt = min(float(np.arccos(np.clip(T[2, 2], -1.0, 1.0))) / TILTED, 1.0)
-        return hypothesis.score * (1.0 - self._matcher.turn_cost * turn - self._matcher.tilt_cost * tilt)
+        p_moved, p_repeated = se3.apply(np.stack([T, T_repeated]), self._center[None])[:, 0]
+        away = min(float(np.linalg.norm(p_moved - p_repeated)) / ELSEWHERE, 1.0) if begun else 0.0
+        return hypothesis.score * (1 - cost.turn * turn - cost.tilt * tilt - cost.change * away)
 
     def _without_held(self, query: Scene) -> PointCloud:
         cloud = find_objects(query.cloud).cloud
