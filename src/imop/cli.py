@@ -132,10 +132,13 @@ def import_(layout: Positional[Literal["rlbench"]], source: Positional[Path], ou
         source: an episode, a task folder, or a folder of task folders.
         out: folder of the store; an existing one is appended to.
     """
+    from rich.progress import track
+
     from imop.demos.rlbench import import_rlbench
 
-    with console.status(f"importing {source}"):
-        count = import_rlbench(source, out)
+    count = import_rlbench(
+        source, out, track=lambda these: track(these, f"importing {source}", transient=True)
+    )
     console.print(f"{count} demonstrations imported into {out}")
     return 0
 
@@ -147,10 +150,14 @@ def check(path: Positional[Path]) -> int:
     Args:
         path: a store, or a folder in RLBench's layout.
     """
-    from imop.demos.check import check as find
+    from rich.progress import track
 
-    with console.status(f"checking {path}"):
-        findings = find(path)
+    from imop.demos.check import check as find
+    from imop.sim.robot import tip_pose
+
+    findings = find(
+        path, tip_pose=tip_pose, track=lambda these: track(these, f"checking {path}", transient=True)
+    )
     for finding in findings:
         console.print(str(finding), highlight=False)
     errors = sum(finding.severity == "error" for finding in findings)
