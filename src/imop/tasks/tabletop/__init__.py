@@ -3,6 +3,9 @@
 Networks train on the base tasks and are tested on the novel ones, which share no kind of object with them.
 """
 
+from imop.tasks.tabletop.close_jar import CloseJar
+from imop.tasks.tabletop.cup_on_hook import CupOnHook
+from imop.tasks.tabletop.item_in_drawer import ItemInDrawer
 from imop.tasks.tabletop.lid_off_pot import LidOffPot
 from imop.tasks.tabletop.open_drawer import OpenDrawer
 from imop.tasks.tabletop.press_buttons import PressButtons
@@ -16,6 +19,9 @@ BASE: dict[str, type[Task]] = {
     "tabletop/stack_cubes": StackCubes,
     "tabletop/ring_on_peg": RingOnPeg,
     "tabletop/press_buttons": PressButtons,
+    "tabletop/close_jar": CloseJar,
+    "tabletop/cup_on_hook": CupOnHook,
+    "tabletop/item_in_drawer": ItemInDrawer,
 }
 
 NOVEL: dict[str, type[Task]] = {
