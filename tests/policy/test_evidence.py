@@ -1,0 +1,90 @@
+"""What a score answers to: overlap, normals, shades, free space, occlusion, and what is left over."""
+
+import numpy as np
+import pytest
+
+from imop.geometry import se3
+from imop.policy.evidence import Judge, Surface, shades
+from tests.policy.scenes import GREEN, RED, at, box, camera, moved
+
+SIZE = (0.08, 0.05, 0.06)
+VIEWS = {"top": camera()}
+
+
+def judged(region, query, T, views=VIEWS):
+    surface = Surface(region, VIEWS)
+    return Judge(surface, np.ones(len(region)), Surface(query, views)).judge(T).score
+
+
+def test_the_true_motion_explains_everything_and_brings_its_pairs(rng):
+    region, T = box(SIZE, RED), at(0.2, 0.1, yaw=1.0)
+    query = moved(box(SIZE, RED, seed=1), T)
+    judge = Judge(Surface(region, VIEWS), np.ones(len(region)), Surface(query, VIEWS))
+    found = judge.judge(T)
+    assert found.score > 0.95 and judge.glance(T) > 0.95
+    pairs = se3.apply(T, found.p_support) - found.p_query
+    assert len(pairs) > 500 and np.linalg.norm(pairs, axis=1).max() < 0.015
+
+
+@pytest.mark.parametrize("wrong", [at(0.03, 0.0), at(0, 0, yaw=0.6), at(0, 0, 1.0)])
+def test_other_motions_explain_less(wrong):
+    region = box(SIZE, RED)
+    assert judged(region, box(SIZE, RED, seed=1), wrong @ at(0, 0, -0.75)) < 0.8
+    assert judged(region, box(SIZE, RED, seed=1), np.eye(4)) > 0.95
+
+
+def test_another_colour_is_another_thing_but_shadow_is_not():
+    region = box(SIZE, RED)
+    dark = box(SIZE, tuple(0.6 * c for c in RED), seed=1)
+    assert judged(region, box(SIZE, GREEN, seed=1), np.eye(4)) < 0.05
+    assert judged(region, dark, np.eye(4)) > 0.7
+
+
+def test_a_larger_box_is_not_a_small_one():
+    small, large = box((0.04, 0.04, 0.04), RED), box((0.1, 0.1, 0.04), RED, seed=1)
+    corner = se3.make(p=(0.03, 0.03, 0))
+    assert judged(small, large, corner) < 0.8 * judged(small, box((0.04, 0.04, 0.04), RED, seed=1), np.eye(4))
+
+
+def test_faces_point_the_same_way():
+    region = box(SIZE, RED)
+    inside_out = type(region)(region.points, region.colors, region.camera, -region.normals)
+    assert judged(region, inside_out, np.eye(4)) < 0.05
+
+
+def test_unseen_space_costs_less_than_empty_space():
+    region = box(SIZE, RED)
+    nothing = region.select(np.arange(0))
+    near, far = np.full((64, 64), 0.5, np.float32), np.full((64, 64), 2.0, np.float32)
+    upper = np.array([[0, 0, 1.0]])
+    assert Surface(nothing, {"top": camera(near)}).hides(np.zeros((1, 3)), upper).all()
+    assert not Surface(nothing, {"top": camera(far)}).hides(np.zeros((1, 3)), upper).any()
+    half = region.select(region.points[:, 0] < 0)
+    assert judged(region, half, np.eye(4), {"top": camera(near)}) > judged(
+        region, half, np.eye(4), {"top": camera(far)}
+    )
+
+
+@pytest.mark.parametrize(
+    ("point", "normal"),
+    [((0, 0, 0), (0, 0, -1)), ((0, 0, 0), (1, 0, 0)), ((5.0, 0, 0), (0, 0, 1)), ((0, 0, 3.0), (0, 0, 1))],
+    ids=["turned away", "edge on", "outside the image", "behind the camera"],
+)
+def test_a_camera_says_nothing_about_what_it_cannot_see(point, normal):
+    surface = Surface(box(SIZE, RED), {"top": camera(np.full((64, 64), 9.0, np.float32))})
+    assert surface.hides(np.array([point], dtype=float), np.array([normal], dtype=float)).all()
+
+
+def test_no_measurement_says_nothing():
+    surface = Surface(box(SIZE, RED), {"top": camera(np.full((64, 64), np.nan, np.float32))})
+    assert surface.hides(np.zeros((1, 3)), np.array([[0, 0, 1.0]])).all()
+
+
+def test_empty_query_explains_nothing():
+    region = box(SIZE, RED)
+    assert judged(region, region.select(np.arange(0)), np.eye(4)) == 0.0
+
+
+def test_shades_tell_hues_from_brightness():
+    red, dark, green = (shades(np.array([c], np.float32))[0] for c in (RED, (0.4, 0.05, 0.05), GREEN))
+    assert np.linalg.norm(red - dark) < 0.3 < np.linalg.norm(red - green)

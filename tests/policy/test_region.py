@@ -1,0 +1,82 @@
+"""Regions of hand-made demonstrations with boxes: which thing a step refers to, and what is held."""
+
+import numpy as np
+
+from imop.geometry import se3
+from imop.policy.region import find_regions
+from tests.policy.scenes import BLUE, GREEN, RED, TABLE, above, at, box, moved, scene, transitions
+
+CUBE = (0.05, 0.05, 0.05)
+PLATE = (0.12, 0.12, 0.02)
+HOME = above(0.0, -0.3, 1.2)
+GRASP = above(0.1, 0.1, TABLE + 0.04)
+LIFT = above(0.1, 0.1, TABLE + 0.24)
+PLACE = above(0.4, -0.1, TABLE + 0.06)
+
+
+def is_like(region, color):
+    return np.allclose(region.cloud.colors, np.array(color, np.float32))
+
+
+def pick_and_place():
+    """A red cube goes from (0.1, 0.1) onto a green plate at (0.4, -0.1); a blue cube stands by."""
+    cube, plate = box(CUBE, RED, at(0.1, 0.1)), box(PLATE, GREEN, at(0.4, -0.1))
+    other = box(CUBE, BLUE, at(0.3, 0.25))
+    held = moved(cube, LIFT @ se3.invert(GRASP))
+    placed = moved(cube, PLACE @ se3.invert(GRASP))
+    before = above(0.1, 0.1, TABLE + 0.14)
+    poses = [(HOME, 1.0), (before, 1.0), (GRASP, 0.6), (LIFT, 0.6), (PLACE, 1.0)]
+    cubes = [cube, cube, cube, held, placed]
+    scenes = [scene([c, plate, other], T, opening) for c, (T, opening) in zip(cubes, poses, strict=True)]
+    return transitions(scenes, [(before, True), (GRASP, False), (LIFT, False), (PLACE, True)])
+
+
+def test_approach_and_grasp_refer_to_what_is_grasped():
+    regions = find_regions(pick_and_place())
+    assert is_like(regions[0], RED) and is_like(regions[1], RED)
+
+
+def test_lift_refers_to_what_is_in_the_hand():
+    assert is_like(find_regions(pick_and_place())[2], RED)
+
+
+def test_placing_refers_to_where_it_is_placed_and_leaves_the_held_thing_out():
+    region = find_regions(pick_and_place())[3]
+    assert is_like(region, GREEN)
+    p_gripper_cube = se3.apply(se3.invert(GRASP), box(CUBE, RED, at(0.1, 0.1)).points)
+    assert len(region.p_gripper_held) > 0.8 * len(p_gripper_cube)
+    assert np.abs(region.p_gripper_held - p_gripper_cube.mean(axis=0)).max() < 0.05
+
+
+def test_weight_is_largest_near_the_contact():
+    long = box((0.04, 0.4, 0.04), RED, at(0.2, 0.0))
+    contact = above(0.2, 0.18, TABLE + 0.02)
+    scenes = [scene([long], HOME), scene([long], contact, 0.5)]
+    region = find_regions(transitions(scenes, [(contact, False)]))[0]
+    near = np.linalg.norm(region.cloud.points - contact[:3, 3], axis=1)
+    assert np.corrcoef(near, region.weight)[0, 1] < -0.9
+    assert region.weight.min() > 0 and region.weight.max() <= 1
+
+
+def test_a_part_that_hangs_in_the_air_is_taken_with_what_carries_it():
+    case = box((0.2, 0.2, 0.3), GREEN, at(0.3, 0.0))
+    handle = box((0.03, 0.08, 0.02), RED, at(0.3, 0.0, TABLE + 0.2) @ se3.make(p=(-0.16, 0, 0)))
+    contact = above(0.14, 0.0, TABLE + 0.21)
+    scenes = [scene([case, handle], HOME), scene([case, handle], contact, 0.5)]
+    region = find_regions(transitions(scenes, [(contact, False)]))[0]
+    red = region.cloud.colors[:, 0] > 0.5
+    assert red.sum() == len(handle) and (~red).sum() > 0.9 * len(case)
+
+
+def test_press_without_a_grasp_refers_to_what_the_tip_touches():
+    button, other = box((0.06, 0.06, 0.03), RED, at(0.2, 0.2)), box(CUBE, BLUE, at(0.2, -0.2))
+    ready, pressed = above(0.2, 0.2, TABLE + 0.15), above(0.2, 0.2, TABLE + 0.03)
+    scenes = [scene([button, other], T, 0.0) for T in (HOME, ready, pressed)]
+    regions = find_regions(transitions(scenes, [(ready, False), (pressed, False)]))
+    assert is_like(regions[0], RED) and is_like(regions[1], RED)
+
+
+def test_bare_table_still_gives_a_region():
+    scenes = [scene([], HOME), scene([], GRASP, 0.5)]
+    region = find_regions(transitions(scenes, [(GRASP, False)]))[0]
+    assert len(region.cloud) and len(region.weight) == len(region.cloud)
