@@ -185,7 +185,7 @@ def test_every_parameter_of_the_matching_network_learns(attention):
     sum(layer.clamp_min(1e-6).log().mean() for layer in found.layers).backward()
     silent = [name for name, p in network.named_parameters() if p.grad is None or not p.grad.any()]
     # Before the first repositioning nothing is known about who is near whom.
-    unused = ("near_bias.0", "region_cross.0.attention.position.0", "query_cross.0.attention.position.0")
+    unused = ("region_cross.0.attention.position.0", "query_cross.0.attention.position.0")
     assert all(name.startswith(unused) for name in silent), silent
 
 
@@ -210,3 +210,11 @@ def test_routing_of_demonstrations_of_different_length():
     alone, _ = network(graphs[2], robot[2:], owner[:1], graphs[4], asked[1:])
     torch.testing.assert_close(scores[1, :1], alone[0], atol=1e-5, rtol=1e-4)
     assert scores[1].softmax(0)[1] == 0
+
+
+def test_every_parameter_of_the_region_network_learns():
+    graphs = [build_graph(tabletop(s), SMALL) for s in (0, 1)]
+    network = RegionNetwork(REGION)
+    sum(stage.square().mean() for stage in network(step(*graphs))).backward()
+    silent = [name for name, p in network.named_parameters() if p.grad is None or not p.grad.any()]
+    assert not silent

@@ -5,18 +5,30 @@ import torch
 
 from imop.training import losses
 
+ONE = torch.zeros(2, dtype=torch.int64)
+
 
 def test_focal_by_hand():
     logits = torch.tensor([math.log(3.0), math.log(3.0)])
     target = torch.tensor([1.0, 0.0])
     expected = (0.25**2 * -math.log(0.75) + 0.75**2 * -math.log(0.25)) / 2
-    assert losses.focal(logits, target).item() == pytest.approx(expected, rel=1e-5)
+    assert losses.focal(logits, target, ONE, 1).item() == pytest.approx(expected, rel=1e-5)
+
+
+def test_focal_counts_clouds_not_points():
+    logits = torch.tensor([1.0, -2.0, 0.5])
+    target = torch.tensor([1.0, 1.0, 0.0])
+    alone = [
+        losses.focal(logits[i], target[i], torch.zeros(len(i), dtype=torch.int64), 1) for i in ([0, 1], [2])
+    ]
+    together = losses.focal(logits, target, torch.tensor([0, 0, 1]), 2)
+    torch.testing.assert_close(together, torch.stack(alone).mean())
 
 
 def test_focal_of_a_perfect_answer_vanishes_and_extreme_logits_stay_finite():
     logits = torch.tensor([200.0, -200.0], requires_grad=True)
-    right = losses.focal(logits, torch.tensor([1.0, 0.0]))
-    wrong = losses.focal(logits, torch.tensor([0.0, 1.0]))
+    right = losses.focal(logits, torch.tensor([1.0, 0.0]), ONE, 1)
+    wrong = losses.focal(logits, torch.tensor([0.0, 1.0]), ONE, 1)
     assert right.item() == 0 and wrong.item() == pytest.approx(200)
     wrong.backward()
     assert torch.isfinite(logits.grad).all()

@@ -68,11 +68,12 @@ def test_the_losses_of_a_batch_train_both_networks():
     parameters = [*region.parameters(), *matching.parameters()]
     optimizer = torch.optim.Adam(parameters, lr=3e-3)
     history = []
-    for _ in range(15):
+    for _ in range(30):
         logits = region(batch.step)
         cloud, size = batch.step.before.cloud, batch.step.before.size
         found = matching(batch.step.before, batch.chosen, batch.query)
-        loss = losses.focal(logits[-1], batch.region) + losses.dice(logits[-1], batch.region, cloud, size)
+        loss = losses.focal(logits[-1], batch.region, cloud, size)
+        loss = loss + losses.dice(logits[-1], batch.region, cloud, size)
         loss = loss + losses.matching(found.layers, batch.targets)
         optimizer.zero_grad()
         loss.backward()

@@ -83,7 +83,7 @@ class MatchingNetwork(nn.Module):
         if config.attention == "global":
             self.region_cross = each(DenseBlock, width, config.heads, True)
             self.query_cross = each(DenseBlock, width, config.heads, True)
-            self.near_bias = each(MLP, 3, 16, config.heads)
+            self.near_bias = nn.ModuleList(MLP(3, 16, config.heads) for _ in range(config.layers - 1))
         else:
             self.region_cross = each(GraphBlock, width, groups, True)
             self.query_cross = each(GraphBlock, width, groups, True)
@@ -139,7 +139,7 @@ class MatchingNetwork(nn.Module):
         else:
             distance = torch.cdist(_moved(T, sides.p_x), sides.p_y) / UNIT
             near = torch.stack([distance.log1p(), torch.exp(-distance), torch.exp(-distance / 4)], dim=-1)
-            bias = self.near_bias[k](near).permute(0, 3, 1, 2)
+            bias = self.near_bias[k - 1](near).permute(0, 3, 1, 2)
             to_y, to_x = _masked(bias, sides.y), _masked(bias.mT, sides.x)
         return self.region_cross[k](x, to_y, y), self.query_cross[k](y, to_x, x)
 

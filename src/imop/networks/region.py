@@ -71,11 +71,13 @@ class RegionNetwork(nn.Module):
         width = config.backbone.widths[0]
         groups = width // config.backbone.group_width
 
-        def blocks(cross: bool) -> nn.ModuleList:
-            return nn.ModuleList(GraphBlock(width, groups, cross) for _ in range(config.stages))
+        def blocks(count: int, cross: bool) -> nn.ModuleList:
+            return nn.ModuleList(GraphBlock(width, groups, cross) for _ in range(count))
 
-        self.across, self.across_back = blocks(True), blocks(True)
-        self.within, self.within_after = blocks(False), blocks(False)
+        stages = config.stages
+        self.across, self.within = blocks(stages, True), blocks(stages, False)
+        # Nobody asks for s_i' after the last stage.
+        self.across_back, self.within_after = blocks(stages - 1, True), blocks(stages - 1, False)
         self.heads = nn.ModuleList(
             nn.Sequential(nn.LayerNorm(width), nn.Linear(width, 1)) for _ in range(config.stages)
         )
@@ -91,12 +93,12 @@ class RegionNetwork(nn.Module):
         logits = []
         for k in range(self.config.stages):
             # Both directions read the features from before the stage, as in the paper's code.
-            x, y = (
-                self.across[k](x, steps.cross, r_cross, y),
-                self.across_back[k](y, steps.cross_back, r_back, x),
-            )
+            asking, answering = x, y
+            x = self.across[k](asking, steps.cross, r_cross, answering)
             x = self.within[k](x, before.levels[0].neighbours, r_before)
-            y = self.within_after[k](y, after.levels[0].neighbours, r_after)
+            if k < len(self.across_back):
+                y = self.across_back[k](answering, steps.cross_back, r_back, asking)
+                y = self.within_after[k](y, after.levels[0].neighbours, r_after)
             logits.append(self.heads[k](x)[:, 0])
         return logits
 

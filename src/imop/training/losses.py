@@ -9,13 +9,21 @@ from torch.nn import functional as F
 GAMMA = 2.0
 
 
-def focal(logits: Tensor, target: Tensor) -> Tensor:
-    """Mean binary focal loss of logits (M,) against targets (M,) 0 or 1: -(1 - p)^2 log p of the true class.
+def focal(logits: Tensor, target: Tensor, cloud: Tensor, size: int) -> Tensor:
+    """Binary focal loss -(1 - p)^2 log p of the true class, mean over each cloud's points, then over clouds.
+
+    Args:
+        logits: (M,) of all points.
+        target: (M,) 0 or 1.
+        cloud: (M,) number of each point's cloud.
+        size: number of clouds.
 
     Source: Lin et al., Focal loss for dense object detection, ICCV 2017, without alpha.
     """
     truth = torch.where(target > 0.5, logits, -logits)
-    return (torch.sigmoid(-truth) ** GAMMA * F.softplus(-truth)).mean()
+    values = torch.sigmoid(-truth) ** GAMMA * F.softplus(-truth)
+    count = torch.bincount(cloud, minlength=size).clamp_min(1)
+    return (values.new_zeros(size).index_add(0, cloud, values) / count).mean()
 
 
 def dice(logits: Tensor, target: Tensor, cloud: Tensor, size: int, smooth: float = 1.0) -> Tensor:

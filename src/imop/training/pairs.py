@@ -74,6 +74,7 @@ class Sample:
         region: (M,) float32, 1 in the region, of the finest points of `before`.
         chosen: (R,) int64, the region points that are matched.
         targets: for each right motion (P, 2) int64: index into `chosen`, index into the query's points.
+        right: (S, 4, 4) float64, the right motions themselves.
     """
 
     before: Graph
@@ -86,6 +87,7 @@ class Sample:
     region: Tensor
     chosen: Tensor
     targets: tuple[Tensor, ...]
+    right: Tensor
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +100,7 @@ class PairBatch:
         region: (M,) targets of the region network.
         chosen: (R,) indices into the finest points of all `step.before`.
         targets: per sample, per right motion: (P, 2) row and column of the sample's correspondence matrix.
+        right: per sample (S, 4, 4) float64, the right motions; stays on the CPU.
     """
 
     step: StepBatch
@@ -105,12 +108,13 @@ class PairBatch:
     region: Tensor
     chosen: Tensor
     targets: tuple[tuple[Tensor, ...], ...]
+    right: tuple[Tensor, ...]
 
     def to(self, device: torch.device | str) -> "PairBatch":
         """The same batch on a device."""
         targets = tuple(tuple(pairs.to(device) for pairs in motions) for motions in self.targets)
         rest = (self.region.to(device), self.chosen.to(device))
-        return PairBatch(self.step.to(device), self.query.to(device), *rest, targets)
+        return PairBatch(self.step.to(device), self.query.to(device), *rest, targets, self.right)
 
 
 def make_sample(pair: StepPair, config: GraphConfig, max_region: int, rng: np.random.Generator) -> Sample:
@@ -137,6 +141,7 @@ def make_sample(pair: StepPair, config: GraphConfig, max_region: int, rng: np.ra
         torch.from_numpy(label.astype(np.float32)),
         torch.from_numpy(chosen),
         match_targets(p_before[chosen], query, pair.T_query_support),
+        torch.from_numpy(np.array(pair.T_query_support, dtype=np.float64)),
     )
 
 
@@ -178,6 +183,7 @@ def collate_samples(samples: Sequence[Sample]) -> PairBatch:
         torch.cat([s.region for s in samples]),
         torch.cat([s.chosen + start for s, start in zip(samples, first_before, strict=True)]),
         tuple(s.targets for s in samples),
+        tuple(s.right for s in samples),
     )
 
 

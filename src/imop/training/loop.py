@@ -1,0 +1,245 @@
+"""Training of the region and matching networks, stopped and resumed at any step without a trace.
+
+python -m imop.training.loop --out runs/train --train PATH --validate PATH
+"""
+
+import json
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+import tyro
+from lightning_fabric import Fabric
+from torch import Tensor, nn
+from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
+from torch.utils.data import DataLoader
+from torch.utils.tensorboard import SummaryWriter
+
+from imop.errors import CorruptData, InvalidInput
+from imop.files import replaced
+from imop.networks.model import Model, ModelConfig, save_model
+from imop.training import losses
+from imop.training.data import PairDataset, loader
+from imop.training.metrics import validate
+from imop.training.pairs import PairBatch
+
+CHECKPOINT = "checkpoint.pt"
+LOG = "log.jsonl"
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """How to train.
+
+    Attributes:
+        out: folder of the checkpoint, the weights and the log.
+        train: folders of shards to train on, equally often.
+        validate: folders of shards to validate on, each reported by its name.
+        steps: optimizer steps in all.
+        batch: pairs per step and process.
+        learning_rate: at its peak.
+        warm_up: steps until the peak; a cosine to 1 % follows.
+        weight_decay: of AdamW.
+        clip: largest norm of the gradient.
+        ema: decay of the averaged weights, which are the ones that are saved and validated.
+        every: steps between validations and checkpoints.
+        validation_pairs: how many of each folder.
+        seed: of weights, data and augmentation.
+        workers: processes that prepare samples.
+    """
+
+    out: Path
+    train: tuple[Path, ...]
+    validate: tuple[Path, ...] = ()
+    steps: int = 20_000
+    batch: int = 8
+    learning_rate: float = 1e-3
+    warm_up: int = 300
+    weight_decay: float = 0.01
+    clip: float = 5.0
+    ema: float = 0.998
+    every: int = 500
+    validation_pairs: int = 200
+    seed: int = 0
+    workers: int = 1
+
+
+class PairLoss(nn.Module):
+    """Batch of pairs -> losses of the region and matching networks, one module that can be distributed."""
+
+    def __init__(self, model: Model):
+        super().__init__()
+        self.region = model.region
+        self.matching = model.matching
+
+    def forward(self, batch: PairBatch) -> dict[str, Tensor]:
+        """The region's focal and Dice losses over all stages, and the matching's over all layers."""
+        before = batch.step.before
+        stages = self.region(batch.step)
+        found = self.matching(before, batch.chosen, batch.query)
+        focal = [losses.focal(stage, batch.region, before.cloud, before.size) for stage in stages]
+        dice = [losses.dice(stage, batch.region, before.cloud, before.size) for stage in stages]
+        return {
+            "focal": torch.stack(focal).sum(),
+            "dice": torch.stack(dice).sum(),
+            "matching": losses.matching(found.layers, batch.targets),
+        }
+
+
+class TrainState:
+    """Everything that a checkpoint holds: weights, their average, the optimizer, the step."""
+
+    def __init__(self, model: Model, config: TrainConfig):
+        self.model = model
+        self.average = AveragedModel(model, multi_avg_fn=_moving_average(config.ema))
+        trained = [*model.region.parameters(), *model.matching.parameters()]
+        self.optimizer = torch.optim.AdamW(trained, lr=config.learning_rate, weight_decay=config.weight_decay)
+        self.step = 0
+
+    def load(self, path: Path) -> None:
+        """Continue from `path` if it is there.
+
+        Raises:
+            CorruptData: if it is not a checkpoint of these networks.
+        """
+        if not path.is_file():
+            return
+        try:
+            saved = torch.load(path, map_location="cpu", weights_only=True)
+            self.model.load_state_dict(saved["model"])
+            self.average.load_state_dict(saved["average"])
+            self.optimizer.load_state_dict(saved["optimizer"])
+            self.step = int(saved["step"])
+        except Exception as error:
+            raise CorruptData(path, f"is not a checkpoint of these networks ({error})") from error
+
+    def save(self, path: Path) -> None:
+        """Write the checkpoint, whole or not at all."""
+        saved: dict[str, Any] = {
+            "model": self.model.state_dict(),
+            "average": self.average.state_dict(),
+            "optimizer": self.optimizer.state_dict(),
+            "step": self.step,
+        }
+        with replaced(path) as temporary:
+            torch.save(saved, temporary)
+
+
+def train(
+    config: TrainConfig, model_config: ModelConfig | None = None, stop_at: int | None = None
+) -> list[dict[str, float]]:
+    """Train from the checkpoint in `config.out`, or from the beginning.
+
+    Args:
+        config: how.
+        model_config: shape of the networks; `small` if None.
+        stop_at: stop after this step, with a checkpoint.
+
+    Returns:
+        The losses of every step taken.
+
+    Raises:
+        CorruptData: if shards or the checkpoint cannot be read.
+        InvalidInput: if there is nothing to train on.
+    """
+    if not config.train:
+        raise InvalidInput("train", "no folder", "at least one folder of shards")
+    fabric = Fabric()
+    fabric.launch()
+    torch.manual_seed(config.seed)
+    state = TrainState(Model(model_config or ModelConfig()), config)
+    state.load(config.out / CHECKPOINT)
+    module, optimizer = fabric.setup(PairLoss(state.model), state.optimizer)
+    state.average.to(fabric.device)
+    last = min(config.steps, stop_at or config.steps)
+    history = []
+    for batch in _batches(config, state, last, fabric.world_size, fabric.global_rank):
+        history.append(_step(fabric, module, optimizer, batch.to(fabric.device), config, state))
+        if state.step % config.every == 0 or state.step == last:
+            if fabric.is_global_zero:
+                _report(config, state, history[-config.every :])
+            fabric.barrier()
+    return history
+
+
+def _batches(
+    config: TrainConfig, state: TrainState, last: int, world: int, rank: int
+) -> DataLoader[PairBatch]:
+    """The batches of one process from the state's step on; samples count over all processes and steps."""
+    dataset = PairDataset(config.train, state.model.config, config.seed)
+    numbers = [
+        (step * world + rank) * config.batch + i
+        for step in range(state.step, last)
+        for i in range(config.batch)
+    ]
+    return loader(dataset, numbers, config.batch, config.workers)
+
+
+def _step(
+    fabric: Fabric,
+    module: nn.Module,
+    optimizer: torch.optim.Optimizer,
+    batch: PairBatch,
+    config: TrainConfig,
+    state: TrainState,
+) -> dict[str, float]:
+    for group in optimizer.param_groups:
+        group["lr"] = config.learning_rate * schedule(state.step, config.warm_up, config.steps)
+    parts = module(batch)
+    loss = torch.stack(list(parts.values())).sum()
+    optimizer.zero_grad()
+    fabric.backward(loss)
+    torch.nn.utils.clip_grad_norm_(module.parameters(), config.clip)
+    optimizer.step()
+    state.average.update_parameters(state.model)
+    state.step += 1
+    return {name: float(value.detach()) for name, value in parts.items()}
+
+
+def schedule(step: int, warm_up: int, steps: int) -> float:
+    """Share of the peak learning rate: linear warm-up, then a cosine down to 1 %."""
+    if step < warm_up:
+        return (step + 1) / warm_up
+    progress = min((step - warm_up) / max(steps - warm_up, 1), 1.0)
+    return 0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * progress))
+
+
+def _report(config: TrainConfig, state: TrainState, recent: list[dict[str, float]]) -> None:
+    """Validate, log, and write checkpoint and weights."""
+    means = {name: sum(r[name] for r in recent) / len(recent) for name in recent[0]}
+    average = state.average.module
+    assert isinstance(average, Model)
+    found = {folder.name: validate(average, folder, config.validation_pairs) for folder in config.validate}
+    record = {"step": state.step, "time": time.time(), "losses": means, "validation": found}
+    config.out.mkdir(parents=True, exist_ok=True)
+    with (config.out / LOG).open("a") as log:
+        log.write(json.dumps(record) + "\n")
+    with SummaryWriter(str(config.out)) as writer:
+        for name, value in means.items():
+            writer.add_scalar(f"loss/{name}", value, state.step)
+        for folder, metrics in found.items():
+            for name, value in metrics.items():
+                writer.add_scalar(f"{folder}/{name}", value, state.step)
+    state.save(config.out / CHECKPOINT)
+    card = {"step": state.step, "seed": config.seed, "losses": means, "validation": found}
+    save_model(average, config.out, card)
+    numbers = {**means, **{f"{f} {n}": v for f, metrics in found.items() for n, v in metrics.items()}}
+    print(f"step {state.step}: " + ", ".join(f"{n} {v:.3f}" for n, v in numbers.items()), flush=True)
+
+
+def _moving_average(decay: float) -> Callable[..., None]:
+    average: Callable[..., None] = get_ema_multi_avg_fn(decay)  # type: ignore[no-untyped-call]
+    return average
+
+
+def main() -> None:
+    """Command line of the training."""
+    train(tyro.cli(TrainConfig, description=__doc__))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,71 @@
+"""How good the networks are on pairs that they were not trained on."""
+
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from imop.geometry import se3
+from imop.networks.matching import reposition
+from imop.networks.model import Model
+from imop.training.data import PairDataset, loader
+from imop.training.pairs import PairBatch
+from imop.types import FloatArray
+
+_BATCH = 8
+
+
+def validate(model: Model, folder: Path, count: int) -> dict[str, float]:
+    """Means over the first `count` pairs of a folder of shards, without augmentation.
+
+    Returns:
+        region_iou: intersection over union at 0.5. match: share of visible region points whose best match is
+        at most 2 cm from the true one. within_2cm_10deg, within_1cm_5deg: share of pairs whose least-squares
+        motion puts the gripper that near to where one of the right motions puts it.
+    """
+    dataset = PairDataset([folder], model.config, seed=0, augmented=False)
+    numbers = range(min(count, len(dataset)))
+    found: dict[str, list[float]] = {}
+    training = model.training
+    model.eval()
+    with torch.no_grad():
+        for batch in loader(dataset, numbers, _BATCH, workers=0):
+            for name, values in _measure(model, batch).items():
+                found.setdefault(name, []).extend(values)
+    model.train(training)
+    return {name: float(np.mean(values)) for name, values in found.items()}
+
+
+def _measure(model: Model, batch: PairBatch) -> dict[str, list[float]]:
+    before = batch.step.before
+    inside = model.region(batch.step)[-1] > 0
+    found = model.matching(before, batch.chosen, batch.query)
+    T = reposition(found.last, found.p_region, found.p_query).double().numpy()
+    best = found.last.argmax(dim=2)
+    measured: dict[str, list[float]] = {"region_iou": [], "match": []}
+    for b, motions in enumerate(batch.targets):
+        here = before.cloud == b
+        truth = batch.region[here] > 0.5
+        union = (inside[here] | truth).sum()
+        measured["region_iou"].append(float((inside[here] & truth).sum() / union))
+        if any(len(pairs) for pairs in motions):
+            p_found = found.p_query[b][best[b]]
+            near = [
+                (p_found[pairs[:, 0]] - found.p_query[b][pairs[:, 1]]).norm(dim=1) < 0.02
+                for pairs in motions
+                if len(pairs)
+            ]
+            measured["match"].append(max(float(hit.float().mean()) for hit in near))
+    goals = batch.step.T_world_goal.double().numpy()
+    for name, distance, angle in (("within_1cm_5deg", 0.01, 5.0), ("within_2cm_10deg", 0.02, 10.0)):
+        measured[name] = [
+            float(_near(T[b] @ goals[b], batch.right[b].numpy() @ goals[b], distance, np.radians(angle)))
+            for b in range(len(T))
+        ]
+    return measured
+
+
+def _near(T: FloatArray, right: FloatArray, distance: float, angle: float) -> bool:
+    """Whether `T` is near one of the poses `right` (S, 4, 4)."""
+    near = se3.translation_distance(right, T) < distance
+    return bool(np.any(near & (se3.rotation_distance(right, np.broadcast_to(T, right.shape)) < angle)))

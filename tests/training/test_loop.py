@@ -1,0 +1,147 @@
+import json
+import os
+import socket
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+import torch
+
+from imop.errors import CorruptData, InvalidInput
+from imop.networks.graph import GraphConfig
+from imop.networks.matching import MatchingConfig
+from imop.networks.model import Model, ModelConfig, load_model, save_model
+from imop.networks.routing import RoutingConfig
+from imop.training.data import PairDataset, loader
+from imop.training.loop import CHECKPOINT, LOG, TrainConfig, schedule, train
+from imop.training.shards import write_shard
+from tests.networks.test_networks import REGION, TINY
+from tests.training.test_pairs import pair
+
+CONFIG = ModelConfig(
+    GraphConfig(max_points=100),
+    REGION,
+    MatchingConfig(TINY, layers=2, max_region=30),
+    RoutingConfig(TINY, 32),
+)
+
+
+@pytest.fixture(scope="module")
+def shards(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("shards")
+    for k in range(2):
+        write_shard([pair(3 * k + i) for i in range(3)], folder / f"{k}.npz")
+    return folder
+
+
+def config(shards, out, **changes):
+    settings = dict(out=out, train=(shards,), steps=6, batch=2, warm_up=2, every=3, workers=0)
+    return TrainConfig(**{**settings, **changes})
+
+
+def weights(folder):
+    return torch.load(folder / CHECKPOINT, weights_only=True)["model"]
+
+
+def gradients(folder):
+    state = torch.load(folder / CHECKPOINT, weights_only=True)["optimizer"]["state"]
+    return [state[i]["exp_avg"] for i in sorted(state)]
+
+
+def test_stopped_and_resumed_training_is_the_same_training(shards, tmp_path):
+    whole = train(config(shards, tmp_path / "a"), CONFIG)
+    first = train(config(shards, tmp_path / "b"), CONFIG, stop_at=2)
+    second = train(config(shards, tmp_path / "b"), CONFIG)
+    assert whole == first + second and len(whole) == 6
+    a, b = weights(tmp_path / "a"), weights(tmp_path / "b")
+    assert all(torch.equal(a[name], b[name]) for name in a)
+
+
+def test_it_validates_logs_and_saves_weights_that_load(shards, tmp_path):
+    train(config(shards, tmp_path, validate=(shards,), validation_pairs=3), CONFIG)
+    records = [json.loads(line) for line in (tmp_path / LOG).read_text().splitlines()]
+    assert [r["step"] for r in records] == [3, 6]
+    assert set(records[0]["losses"]) == {"focal", "dice", "matching"}
+    metrics = records[-1]["validation"][shards.name]
+    assert all(0 <= value <= 1 for value in metrics.values()) and "region_iou" in metrics
+    assert load_model(tmp_path).config == CONFIG
+
+
+def test_a_damaged_checkpoint_is_named(shards, tmp_path):
+    train(config(shards, tmp_path), CONFIG, stop_at=1)
+    path = tmp_path / CHECKPOINT
+    path.write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(CorruptData, match=CHECKPOINT):
+        train(config(shards, tmp_path), CONFIG)
+
+
+def test_nothing_to_train_on(tmp_path):
+    with pytest.raises(InvalidInput, match="train"):
+        train(config(tmp_path, tmp_path, train=()), CONFIG)
+    with pytest.raises(CorruptData, match="shard"):
+        train(config(tmp_path, tmp_path), CONFIG)
+
+
+def test_samples_depend_on_their_number_alone(shards):
+    dataset = PairDataset([shards], CONFIG, seed=0)
+    (first,) = loader(dataset, [7], 1, 0)
+    *_, again = loader(dataset, [3, 7], 1, 0)
+    torch.testing.assert_close(first.query.points, again.query.points)
+
+
+def test_schedule_warms_up_and_cools_down():
+    values = [schedule(step, 10, 100) for step in range(101)]
+    assert values[9] == 1 and values[100] == pytest.approx(0.01)
+    assert all(a < b for a, b in pairwise(values[:10]))
+    assert all(a >= b for a, b in pairwise(values[10:]))
+
+
+@pytest.mark.parametrize("damage", ["card.json", "weights.safetensors"])
+def test_damaged_weights_are_refused(tmp_path, damage):
+    save_model(Model(CONFIG), tmp_path, {})
+    assert load_model(tmp_path).config == CONFIG
+    path = tmp_path / damage
+    path.write_bytes(path.read_bytes()[:-20])
+    with pytest.raises(CorruptData, match=str(tmp_path)):
+        load_model(tmp_path)
+
+
+def test_weights_of_another_shape_are_refused(tmp_path):
+    save_model(Model(CONFIG), tmp_path, {})
+    card = json.loads((tmp_path / "card.json").read_text())
+    card["config"]["matching"]["layers"] = 3
+    (tmp_path / "card.json").write_text(json.dumps(card))
+    with pytest.raises(CorruptData, match="fit"):
+        load_model(tmp_path)
+
+
+WORKER = """
+import sys
+from pathlib import Path
+from tests.training.test_loop import CONFIG, config
+from imop.training.loop import train
+train(config(Path(sys.argv[1]), Path(sys.argv[2]), batch=1, steps=1), CONFIG)
+"""
+
+
+def test_two_processes_train_as_one(shards, tmp_path):
+    """One step of two processes with a pair each is one step with both pairs."""
+    train(config(shards, tmp_path / "one", steps=1), CONFIG)
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    root = Path(__file__).parents[2]
+    common = {**os.environ, "MASTER_ADDR": "127.0.0.1", "MASTER_PORT": str(port), "WORLD_SIZE": "2"}
+    common |= {"PYTHONPATH": str(root), "OMP_NUM_THREADS": "1", "LT_ACCELERATOR": "cpu", "LT_DEVICES": "2"}
+    arguments = [sys.executable, "-c", WORKER, str(shards), str(tmp_path / "two")]
+    processes = [
+        subprocess.Popen(arguments, env={**common, "RANK": str(r), "LOCAL_RANK": str(r)}, cwd=root)
+        for r in range(2)
+    ]
+    assert [p.wait(timeout=120) for p in processes] == [0, 0]
+    # AdamW turns rounding of tiny gradients into whole steps, so its first moment is compared: the gradient.
+    one, two = gradients(tmp_path / "one"), gradients(tmp_path / "two")
+    for a, b in zip(one, two, strict=True):
+        torch.testing.assert_close(a, b, atol=1e-6, rtol=1e-3)
