@@ -39,6 +39,7 @@ def spring_button(radius: float, color: Color, housing_color: Color) -> Any:
         limited=mujoco.mjtLimited.mjLIMITED_TRUE,
         stiffness=_STRENGTH,
         springref=-_PRELOAD,
+        solref_limit=[0.004, 1],
         damping=6.0,
         armature=0.05,
     )

@@ -7,7 +7,7 @@ from typing import Any
 
 import mujoco
 
-_TIME = 0.02
+_TIME = 0.003
 """Seconds in which a needle that nothing pushes comes to rest, friction aside."""
 
 

@@ -11,6 +11,7 @@ from imop.sim.parts.cabinet import HANDLE_OUT, CabinetShape, drawer_cabinet
 from imop.sim.parts.shapes import add_to
 from imop.sim.parts.solids import block
 from imop.sim.world import World
+from imop.tasks.checks import rehearse
 from imop.tasks.colors import random_color
 from imop.tasks.grasps import backed_off, from_above, from_front, shifted
 from imop.tasks.layout import Area, Item
@@ -21,6 +22,8 @@ from imop.types import FloatArray
 LEVELS = ("bottom", "middle", "top")
 PULL = 0.15
 _PITCH = np.radians(8.0)
+_OPENING = 4
+"""Number of steps that open the drawer."""
 _OUT = 0.09
 """From the case's front to where the item is let go: clear of the handles of the drawers above."""
 _ROOM = 0.065
@@ -90,6 +93,15 @@ class ItemInDrawer(Task):
             Waypoint(item, shifted(grasp, (0, 0, 0.15)), False, allow_collisions=True, linear=True),
             Waypoint(cabinet, inside, gripper_open=True),
         ]
+
+    def _problem(self, world: World) -> str:
+        """As for any task, and the item's way has to be free when the drawer is open, too."""
+        if problem := super()._problem(world):
+            return problem
+        world.set_joint(self.drawer, PULL)
+        problem = rehearse(world, self.waypoints(world)[_OPENING:])
+        world.set_joint(self.drawer, 0.0)
+        return problem
 
     @property
     def _over_the_drawer(self) -> FloatArray:
