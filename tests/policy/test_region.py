@@ -80,3 +80,14 @@ def test_bare_table_still_gives_a_region():
     scenes = [scene([], HOME), scene([], GRASP, 0.5)]
     region = find_regions(transitions(scenes, [(GRASP, False)]))[0]
     assert len(region.cloud) and len(region.weight) == len(region.cloud)
+
+
+def test_closing_on_nothing_is_not_a_grasp():
+    first, second = box((0.06, 0.06, 0.03), RED, at(0.2, 0.2)), box((0.06, 0.06, 0.03), BLUE, at(0.2, -0.2))
+    poses = [above(0.2, y, TABLE + h) for y, h in ((0.2, 0.12), (0.2, 0.03), (0.2, 0.12), (-0.2, 0.12))]
+    poses.append(above(0.2, -0.2, TABLE + 0.03))
+    openings = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    scenes = [scene([first, second], T, w) for T, w in zip([HOME, *poses], openings, strict=True)]
+    regions = find_regions(transitions(scenes, [(T, False) for T in poses]))
+    assert [is_like(region, RED) for region in regions] == [True, True, True, False, False]
+    assert is_like(regions[3], BLUE) and is_like(regions[4], BLUE)

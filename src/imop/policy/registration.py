@@ -9,12 +9,13 @@ from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, farthest_points, voxel_downsample
 from imop.geometry.features import fpfh
 from imop.geometry.neighbours import within
+from imop.policy.contacts import SAME
 from imop.policy.evidence import Judge, Surface
 from imop.policy.hypotheses import distinct, mutual_matches, sample_motions
 from imop.policy.matcher import Hypothesis, Scene, Transition
 from imop.policy.objects import connected, find_objects
 from imop.policy.refine import FINEST, Refiner, upright
-from imop.policy.region import SAME, Region, find_regions
+from imop.policy.region import Region, find_regions
 from imop.types import FloatArray
 
 # How many of the refined motions get the finest stage too.
