@@ -83,7 +83,9 @@ class SelfFilter:
         """
         points = as_array("points", points, (None, 3))
         data = self._posed(joint_positions, gripper_opening)
-        p_model = se3.apply(se3.invert(self._T_world_model), points)
+        # A point this far away is in no solid.
+        known = np.where(np.isfinite(points).all(axis=1, keepdims=True), points, 1e6)
+        p_model = se3.apply(se3.invert(self._T_world_model), known)
         robot = np.zeros(len(points), dtype=bool)
         for solids in self._bodies:
             centre, radius = _enclosing_sphere(solids, data)
