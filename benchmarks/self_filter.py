@@ -1,75 +1,126 @@
-"""How much of the robot, and of everything else, the self-filter removes from real RLBench recordings.
+"""How well the Panda's self-filter separates robot and scene on real RLBench demonstrations.
 
-    python benchmarks/self_filter.py --demos PATH --json FILE
+Every stored frame, every policy camera; the recorded instance masks say which points are robot. The
+filter itself sees joint positions and gripper opening only.
 
-The filter gets joint positions and the gripper's opening, nothing else. The masks of the recordings, which no policy reads,
-say which points are robot. Counted are the points of the four policy cameras within the workspace, of frame 0 and of
-every keyframe.
+    python benchmarks/self_filter.py --demos ../shared/data/rlbench_demos --json self_filter.json
 """
 
-import argparse
-from collections import Counter
+import json
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import tyro
+from rich.console import Console
+from rich.table import Table
 
 from imop.demos.rlbench import episodes, read_episode
-from imop.evaluation.report import save_json
-from imop.geometry import cloud as clouds
+from imop.geometry.cloud import unproject
 from imop.geometry.perception import WORKSPACE_LOWER, WORKSPACE_UPPER
+from imop.geometry.self_filter import SelfFilter
 from imop.sim.robot import panda_self_filter
-from imop.types import Observation
+from imop.types import BoolArray, CameraView, FloatArray, Observation
 
-# Instance ids of the Panda in the recordings: fingers, hand, links.
+# RLBench's instance ids of the fingers, the hand and the links.
 ROBOT_IDS = (31, 34, 35, *range(39, 47))
-# Points this near to the tip of a closed gripper are what it holds, metres.
-GRASPED = 0.03
+HELD_RADIUS = 0.03
 
 
-def count(observation: Observation) -> Counter[str]:
-    """Points of the robot, of the rest, and of what is held, and how many of each are removed."""
-    cloud = clouds.crop(clouds.fuse(observation), WORKSPACE_LOWER, WORKSPACE_UPPER)
-    assert cloud.ids is not None and observation.joint_positions is not None
-    removed = panda_self_filter().is_robot(
-        cloud.points, observation.joint_positions, observation.gripper_opening
-    )
-    robot = np.isin(cloud.ids, ROBOT_IDS)
-    held = ~robot & (np.linalg.norm(cloud.points - observation.T_world_gripper[:3, 3], axis=1) < GRASPED)
-    if observation.gripper_opening > 0.9:
-        held[:] = False
-    kinds = {"robot": robot, "other": ~robot, "held": held}
-    counted: Counter[str] = Counter()
-    for name, of_kind in kinds.items():
-        counted[name] = int(of_kind.sum())
-        counted[f"{name} removed"] = int((of_kind & removed).sum())
-    return counted
+@dataclass
+class Options:
+    """Settings of the benchmark.
+
+    Attributes:
+        demos: a folder in RLBench's layout with instance masks.
+        json: where the results go.
+    """
+
+    demos: Path
+    json: Path | None = None
 
 
-def measure(demos: Path) -> dict[str, float]:
-    """Fractions removed over all recordings below `demos`."""
-    total: Counter[str] = Counter()
+@dataclass
+class Count:
+    """How many of some points were removed."""
+
+    removed: int = 0
+    total: int = 0
+
+    def add(self, removed: BoolArray, chosen: BoolArray) -> None:
+        self.removed += int(np.count_nonzero(removed & chosen))
+        self.total += int(np.count_nonzero(chosen))
+
+    @property
+    def fraction(self) -> float:
+        return self.removed / self.total if self.total else float("nan")
+
+
+def observations(demos: Path) -> Iterator[Observation]:
     for path in episodes(demos):
         demonstration = read_episode(path)
-        for observation in (*(k.observation for k in demonstration.keyframes), demonstration.final):
-            total += count(observation)
-    kinds = ("robot", "other", "held")
-    fractions = {f"{kind}_removed": total[f"{kind} removed"] / max(total[kind], 1) for kind in kinds}
-    return fractions | {f"{kind}_points": total[kind] for kind in kinds}
+        yield from (keyframe.observation for keyframe in demonstration.keyframes)
+        yield demonstration.final
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--demos", type=Path, required=True, help="folder in RLBench's layout")
-    parser.add_argument("--json", type=Path, help="write the numbers here")
-    arguments = parser.parse_args()
-    found = measure(arguments.demos)
-    for kind in ("robot", "other", "held"):
-        print(
-            f"{kind:6} {found[f'{kind}_points']:8.0f} points, {100 * found[f'{kind}_removed']:.2f} % removed"
-        )
-    if arguments.json:
-        save_json(found, arguments.json)
+def measure(self_filter: SelfFilter, demos: Path) -> dict[str, Count]:
+    """Counts of removed points: of the robot, of all others, and of what the closed fingers hold."""
+    names = ("robot", "others", "robot, workspace", "others, workspace", "held")
+    counts = {name: Count() for name in names}
+    for observation in observations(demos):
+        if observation.joint_positions is None:
+            continue
+        q, opening = observation.joint_positions, observation.gripper_opening
+        for view in observation.views.values():
+            points, robot = labelled(view)
+            removed = self_filter.is_robot(points, q, opening)
+            inside = np.all((points >= WORKSPACE_LOWER) & (points <= WORKSPACE_UPPER), axis=1)
+            tip = observation.T_world_gripper[:3, 3]
+            near = np.linalg.norm(points - tip, axis=1) < HELD_RADIUS
+            counts["robot"].add(removed, robot)
+            counts["others"].add(removed, ~robot)
+            counts["robot, workspace"].add(removed, robot & inside)
+            counts["others, workspace"].add(removed, ~robot & inside)
+            if opening < 0.5:
+                counts["held"].add(removed, ~robot & near)
+    return counts
+
+
+def labelled(view: CameraView) -> tuple[FloatArray, BoolArray]:
+    """Points (N, 3) of a view and whether its mask says robot (N,)."""
+    if view.instance_ids is None:
+        raise SystemExit("the recordings have no instance masks to compare with")
+    measured = view.measured
+    points = unproject(view).reshape(*view.depth.shape, 3)[measured]
+    return points, np.isin(view.instance_ids[measured], ROBOT_IDS)
+
+
+def seconds_per_cloud(self_filter: SelfFilter, demos: Path, points: int = 50_000) -> float:
+    """Median time of one call on a cloud of `points`."""
+    observation = next(iter(observations(demos)))
+    cloud = np.concatenate([labelled(view)[0] for view in observation.views.values()])[:points]
+    times = []
+    for _ in range(9):
+        start = time.perf_counter()
+        self_filter.is_robot(cloud, observation.joint_positions, observation.gripper_opening)
+        times.append(time.perf_counter() - start)
+    return float(np.median(times))
+
+
+def main(options: Options) -> None:
+    self_filter = panda_self_filter()
+    counts = measure(self_filter, options.demos)
+    seconds = seconds_per_cloud(self_filter, options.demos)
+    table = Table("points", "removed", "of", "fraction")
+    for name, count in counts.items():
+        table.add_row(name, str(count.removed), str(count.total), f"{count.fraction:.3%}")
+    Console().print(table, f"{seconds * 1e3:.0f} ms per 50k points")
+    if options.json:
+        results = {name: {**vars(count), "fraction": count.fraction} for name, count in counts.items()}
+        options.json.write_text(json.dumps({"removed": results, "seconds_per_50k_points": seconds}, indent=2))
 
 
 if __name__ == "__main__":
-    main()
+    main(tyro.cli(Options))

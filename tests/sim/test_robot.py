@@ -2,84 +2,139 @@ import frankik
 import mujoco
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from imop.errors import InvalidInput
 from imop.geometry import se3
-from imop.sim.robot import (
-    FINGER_STROKE,
-    JOINT_LOWER,
-    JOINT_UPPER,
-    PANDA_HOME_Q,
-    T_WORLD_BASE,
-    panda_spec,
-    tip_pose,
-)
+from imop.sim import robot
+
+JOINTS = st.tuples(
+    *(st.floats(lo, hi) for lo, hi in zip(robot.JOINT_LOWER, robot.JOINT_UPPER, strict=True))
+).map(np.array)
+
+# frankik's fk returns Franka's hand frame moved to its tool centre point.
+T_FLANGE_FRANKIK_TCP = se3.make(se3.euler(z=-np.pi / 4), (0, 0, 0.1034))
 
 
 @pytest.fixture(scope="module")
-def model():
-    return panda_spec().compile()
+def model() -> mujoco.MjModel:
+    return robot.panda_spec().compile()
 
 
-def random_q(rng):
-    return rng.uniform(JOINT_LOWER, JOINT_UPPER)
+def tip_of(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    site = data.site("tip")
+    return robot.T_WORLD_BASE @ se3.make(site.xmat.reshape(3, 3), site.xpos)
 
 
-def test_forward_kinematics_agrees_with_frankik(rng, model):
+def simulate(model: mujoco.MjModel, data: mujoco.MjData, seconds: float) -> None:
+    for _ in range(round(seconds / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+
+
+@pytest.fixture
+def home(model: mujoco.MjModel) -> mujoco.MjData:
     data = mujoco.MjData(model)
-    # frankik's forward kinematics gives the hand's tool centre, and its offset is rounded: that of its answer for
-    # one configuration takes the place of the documented one.
-    kinematics = frankik.FrankaKinematics(frankik.RobotType.PANDA)
-    tool = se3.invert(T_WORLD_BASE @ kinematics.forward(PANDA_HOME_Q)) @ tip_pose(PANDA_HOME_Q)
-    np.testing.assert_allclose(tool[:3, 3], (0, 0, 0.1099 - 0.1034), atol=2.1e-3)
-    for _ in range(50):
-        q = rng.uniform(JOINT_LOWER, JOINT_UPPER)
-        np.testing.assert_allclose(tip_pose(q), T_WORLD_BASE @ kinematics.forward(q) @ tool, atol=1e-6)
+    data.qpos[:7] = data.ctrl[:7] = robot.PANDA_HOME_Q
+    data.qpos[7:] = data.ctrl[7:] = robot.FINGER_STROKE
+    mujoco.mj_forward(model, data)
+    return data
+
+
+@given(JOINTS)
+def test_flange_agrees_with_frankik(q):
+    T_base_flange = se3.invert(robot.T_WORLD_BASE) @ robot.link_poses(q)[-1]
+    np.testing.assert_allclose(T_base_flange, frankik.fk(q) @ se3.invert(T_FLANGE_FRANKIK_TCP), atol=1e-6)
+
+
+def test_model_agrees_with_closed_form(model, rng):
+    data = mujoco.MjData(model)
+    for q in rng.uniform(robot.JOINT_LOWER, robot.JOINT_UPPER, (50, 7)):
         data.qpos[:7] = q
         mujoco.mj_kinematics(model, data)
-        site = data.site("tip")
-        found = T_WORLD_BASE @ se3.make(site.xmat.reshape(3, 3), site.xpos)
-        np.testing.assert_allclose(found, tip_pose(q), atol=1e-6)
+        np.testing.assert_allclose(tip_of(model, data), robot.tip_pose(q), atol=1e-6)
 
 
-def test_the_home_pose_is_that_of_rlbench():
-    T = tip_pose(PANDA_HOME_Q)
-    np.testing.assert_allclose(T[:3, 3], (0.2785, -0.0082, 1.4720), atol=2e-3)
-    np.testing.assert_allclose(T[:3, 2], (0.240, 0, -0.971), atol=5e-3)
+def test_home_is_rlbench_start():
+    """Recorded start of RLBench's episodes (position, quaternion xyzw)."""
+    pose = se3.to_pose7(robot.tip_pose(robot.PANDA_HOME_Q))
+    np.testing.assert_allclose(pose[:3], (0.2785, -0.0082, 1.4720), atol=0.003)
+    np.testing.assert_allclose(pose[3:], (0, 0.9927, 0, 0.1209), atol=0.003)
 
 
-def test_it_stands_still_against_gravity(model):
-    data = mujoco.MjData(model)
-    data.qpos[:7], data.qpos[7:] = PANDA_HOME_Q, FINGER_STROKE
-    data.ctrl[:7], data.ctrl[7:] = PANDA_HOME_Q, FINGER_STROKE
-    mujoco.mj_step(model, data, nstep=500)
-    np.testing.assert_allclose(data.qpos[:7], PANDA_HOME_Q, atol=1e-3)
-    assert data.ncon == 0
+def test_names_and_limits_are_frankas(model):
+    for i, name in enumerate(robot.ARM_JOINTS):
+        np.testing.assert_allclose(model.joint(name).range, (robot.JOINT_LOWER[i], robot.JOINT_UPPER[i]))
+        np.testing.assert_allclose(model.actuator(name).ctrlrange, model.joint(name).range)
+        np.testing.assert_allclose(model.actuator(name).forcerange[1], robot.JOINT_TORQUE[i])
+    for name in robot.FINGER_JOINTS:
+        np.testing.assert_allclose(model.joint(name).range, (0, 0.04))
+    bodies = {model.body(i).name for i in range(model.nbody)}
+    assert bodies >= {*(f"link{i}" for i in range(8)), "hand", "left_finger", "right_finger"}
 
 
-@pytest.mark.parametrize("opening", [0.0, 0.5, 1.0])
-def test_fingers_are_mirrored_about_the_tip(model, opening):
-    data = mujoco.MjData(model)
-    data.qpos[7:] = opening * FINGER_STROKE
-    mujoco.mj_kinematics(model, data)
-    site = data.site("tip")
-    T = se3.make(site.xmat.reshape(3, 3), site.xpos)
-    first, second = (
-        se3.apply(se3.invert(T), data.body(name).xpos[None])[0] for name in ("left_finger", "right_finger")
+@pytest.mark.parametrize("q", [[0.0] * 6, [[0.0] * 7]])
+def test_wrong_number_of_joints_is_refused(q):
+    with pytest.raises(InvalidInput, match="q"):
+        robot.tip_pose(q)
+
+
+def test_stands_still_at_home(model, home):
+    simulate(model, home, 2.0)
+    assert np.abs(home.qpos[:7] - robot.PANDA_HOME_Q).max() < 1e-4
+    assert home.ncon == 0
+
+
+def test_follows_its_targets(model, home):
+    target = robot.PANDA_HOME_Q + (0.2, 0.1, -0.2, -0.3, 0.2, 0.2, 0.3)
+    home.ctrl[:7] = target
+    simulate(model, home, 3.0)
+    assert np.abs(home.qpos[:7] - target).max() < 2e-3
+
+
+def test_fingers_close_and_open_together_on_their_sides(model, home):
+    for target in (0.0, robot.FINGER_STROKE):
+        home.ctrl[7:] = target
+        simulate(model, home, 0.5)
+        np.testing.assert_allclose(home.qpos[7:9], target, atol=5e-4)
+    tip = home.site("tip")
+    left, right = (
+        (home.body(name).xpos - tip.xpos) @ tip.xmat.reshape(3, 3) for name in ("left_finger", "right_finger")
     )
-    np.testing.assert_allclose(first[[0, 2]], second[[0, 2]], atol=1e-9)
-    assert first[1] == pytest.approx(-second[1], abs=1e-9)
-    joint = model.joint("finger_joint1")
-    moved = data.xpos[joint.bodyid[0]] if hasattr(joint, "bodyid") else data.body("left_finger").xpos
-    assert (opening == 0) or se3.apply(se3.invert(T), moved[None])[0, 1] < 0
+    np.testing.assert_allclose((left[1], right[1]), (-0.04, 0.04), atol=1e-3)
 
 
-def test_limits_are_those_of_the_model(model):
-    np.testing.assert_allclose(model.jnt_range[:7], np.stack([JOINT_LOWER, JOINT_UPPER], axis=1))
-    np.testing.assert_allclose(model.jnt_range[7:], [[0, FINGER_STROKE]] * 2)
+def test_finger_ends_and_faces_meet_the_tip(model, home):
+    """At the tip's height the fingers end, and when closed their faces meet there."""
+    home.qpos[7:] = 0
+    mujoco.mj_kinematics(model, home)
+    tip = home.site("tip")
+    ends, faces = [], []
+    for name in ("left_finger_3", "right_finger_3"):
+        geom = home.geom(name)
+        R = tip.xmat.reshape(3, 3).T @ geom.xmat.reshape(3, 3)
+        centre = tip.xmat.reshape(3, 3).T @ (geom.xpos - tip.xpos)
+        extent = np.abs(R) @ model.geom(name).size
+        ends.append(centre[2] + extent[2])
+        faces.append(abs(centre[1]) - extent[1])
+    np.testing.assert_allclose(ends, 0, atol=2e-3)
+    np.testing.assert_allclose(faces, 0, atol=5e-4)
 
 
-@pytest.mark.parametrize("q", [np.zeros(6), np.zeros((7, 1)), "home"])
-def test_bad_joints_are_named(q):
-    with pytest.raises(InvalidInput):
-        tip_pose(q)
+def test_hand_spans_what_rlbenchs_does(model, home):
+    """Extent in the tip frame: x +-0.032, y -0.100 .. 0.104, z -0.138 .. -0.046."""
+    tip, lower, upper = home.site("tip"), [], []
+    for i in range(model.ngeom):
+        if model.body(model.geom_bodyid[i]).name == "hand":
+            R = tip.xmat.reshape(3, 3).T @ home.geom_xmat[i].reshape(3, 3)
+            centre = tip.xmat.reshape(3, 3).T @ (home.geom_xpos[i] - tip.xpos)
+            half = model.geom_aabb[i, 3:]
+            lower.append(centre - np.abs(R) @ half)
+            upper.append(centre + np.abs(R) @ half)
+    np.testing.assert_allclose(np.min(lower, axis=0), (-0.032, -0.100, -0.138), atol=0.005)
+    np.testing.assert_allclose(np.max(upper, axis=0), (0.032, 0.104, -0.046), atol=0.005)
+
+
+def test_every_link_is_about_as_heavy_as_identified(model):
+    assert model.body_mass.sum() == pytest.approx(17.5, abs=1.0)
+    assert (model.body_gravcomp[1:] == 1).all()
