@@ -50,29 +50,35 @@ class Count:
     total: int = 0
 
     def add(self, removed: BoolArray, chosen: BoolArray) -> None:
+        """Count those of the `chosen` points (N,) that were `removed` (N,)."""
         self.removed += int(np.count_nonzero(removed & chosen))
         self.total += int(np.count_nonzero(chosen))
 
     @property
     def fraction(self) -> float:
+        """Removed points per point; NaN without points."""
         return self.removed / self.total if self.total else float("nan")
 
 
-def observations(demos: Path) -> Iterator[Observation]:
+def observations(demos: Path) -> Iterator[tuple[Observation, FloatArray]]:
+    """Every stored observation and its joint positions (7,)."""
     for path in episodes(demos):
         demonstration = read_episode(path)
-        yield from (keyframe.observation for keyframe in demonstration.keyframes)
-        yield demonstration.final
+        for observation in (
+            *(keyframe.observation for keyframe in demonstration.keyframes),
+            demonstration.final,
+        ):
+            if observation.joint_positions is None:
+                raise SystemExit(f"{path} has no joint positions")
+            yield observation, observation.joint_positions
 
 
 def measure(self_filter: SelfFilter, demos: Path) -> dict[str, Count]:
     """Counts of removed points: of the robot, of all others, and of what the closed fingers hold."""
     names = ("robot", "others", "robot, workspace", "others, workspace", "held")
     counts = {name: Count() for name in names}
-    for observation in observations(demos):
-        if observation.joint_positions is None:
-            continue
-        q, opening = observation.joint_positions, observation.gripper_opening
+    for observation, q in observations(demos):
+        opening = observation.gripper_opening
         for view in observation.views.values():
             points, robot = labelled(view)
             removed = self_filter.is_robot(points, q, opening)
@@ -99,12 +105,12 @@ def labelled(view: CameraView) -> tuple[FloatArray, BoolArray]:
 
 def seconds_per_cloud(self_filter: SelfFilter, demos: Path, points: int = 50_000) -> float:
     """Median time of one call on a cloud of `points`."""
-    observation = next(iter(observations(demos)))
+    observation, q = next(observations(demos))
     cloud = np.concatenate([labelled(view)[0] for view in observation.views.values()])[:points]
     times = []
     for _ in range(9):
         start = time.perf_counter()
-        self_filter.is_robot(cloud, observation.joint_positions, observation.gripper_opening)
+        self_filter.is_robot(cloud, q, observation.gripper_opening)
         times.append(time.perf_counter() - start)
     return float(np.median(times))
 

@@ -86,7 +86,7 @@ def test_stands_still_at_home(model, home):
 
 
 def test_follows_its_targets(model, home):
-    target = robot.PANDA_HOME_Q + (0.2, 0.1, -0.2, -0.3, 0.2, 0.2, 0.3)
+    target = robot.PANDA_HOME_Q + np.array([0.2, 0.1, -0.2, -0.3, 0.2, 0.2, 0.3])
     home.ctrl[:7] = target
     simulate(model, home, 3.0)
     assert np.abs(home.qpos[:7] - target).max() < 2e-3
@@ -135,6 +135,6 @@ def test_hand_spans_what_rlbenchs_does(model, home):
     np.testing.assert_allclose(np.max(upper, axis=0), (0.032, 0.104, -0.046), atol=0.005)
 
 
-def test_every_link_is_about_as_heavy_as_identified(model):
+def test_mass_is_the_identified_one_and_gravity_compensated(model):
     assert model.body_mass.sum() == pytest.approx(17.5, abs=1.0)
     assert (model.body_gravcomp[1:] == 1).all()

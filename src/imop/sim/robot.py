@@ -97,8 +97,8 @@ _FILTER_MARGIN = {
     "link0": 0.015,
     "link1": 0.012,
     "link2": 0.012,
-    "left_finger": 0.002,
-    "right_finger": 0.002,
+    "left_finger": 0.0012,
+    "right_finger": 0.0012,
 }
 
 # Shapes that overlap at rest although their bodies are not neighbours in MuJoCo's sense.
