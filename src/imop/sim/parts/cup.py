@@ -54,8 +54,8 @@ def cup(shape: CupShape, color: Color) -> Any:
     lathe.shell(spec, body, "wall", wall, WALL, color, PLASTIC)
     _, x, bottom, top = shape.loop
     outer, top, bottom = x + _BAR, top + _BAR, bottom - _BAR
-    inner_top = shape.radius - WALL / 2
-    inner_bottom = low + (shape.radius - low) * (h + bottom) / h - WALL / 2
+    inner_top = shape.radius + 0.001
+    inner_bottom = low + (shape.radius - low) * (h + bottom) / h + 0.001
     for a, b in (
         ((inner_top, 0, top), (outer, 0, top)),
         ((outer, 0, top), (outer, 0, bottom)),

@@ -9,6 +9,7 @@ import numpy as np
 from imop.geometry import se3
 from imop.sim.parts.jar import DROP, LID_HEIGHT, TOP, TURN, JarShape, jar, screw_lid
 from imop.sim.parts.shapes import add_to
+from imop.sim.parts.solids import trinket
 from imop.sim.world import World
 from imop.tasks.colors import NAMED, random_color
 from imop.tasks.grasps import backed_off, from_above, shifted
@@ -46,6 +47,7 @@ class CloseJar(Task):
         others = rng.permutation([c for c in COLORS if c != color])
         for i in range(_OTHERS):
             add_to(spec, f"other{i}", jar(self.shape, NAMED[str(others[i])], content, label))
+        add_to(spec, "decoy", trinket("box", 0.034, self.shape.height, NAMED[color]))
         grey = rng.uniform(0.4, 0.9)
         add_to(spec, "lid", screw_lid(self.shape, (grey, grey, grey), random_color(rng, 0.0, 0.3)))
 
@@ -56,6 +58,7 @@ class CloseJar(Task):
             Item("jar/body", ((0, 0, 0.08),), height),
             Item("lid/body", ((0, 0, 0.07),), LID_HEIGHT),
             *others,
+            Item("decoy/body", ((0, 0, 0.034),)),
         ]
 
     def waypoints(self, world: World) -> Sequence[Waypoint]:

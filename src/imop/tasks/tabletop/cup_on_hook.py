@@ -9,6 +9,7 @@ import numpy as np
 from imop.geometry import se3
 from imop.sim.parts.cup import HANG, ROD, WALL, CupShape, along_rod, cup, hook_stand
 from imop.sim.parts.shapes import add_to
+from imop.sim.parts.solids import trinket
 from imop.sim.world import World
 from imop.tasks.colors import NAMED, random_color
 from imop.tasks.grasps import backed_off, from_above, shifted
@@ -51,6 +52,7 @@ class CupOnHook(Task):
         add_to(spec, "stand", hook_stand(height, random_color(rng, 0.1, 0.5), random_color(rng)))
         add_to(spec, "cup", cup(self.shape, NAMED[color]))
         add_to(spec, "other_cup", cup(self.shape, NAMED[other]))
+        add_to(spec, "decoy", trinket("can", 0.03, rng.uniform(0.05, 0.08), NAMED[color]))
 
     def items(self) -> Sequence[Item]:
         r, h = self.shape.radius, self.shape.height
@@ -59,6 +61,7 @@ class CupOnHook(Task):
             Item("stand/body", ((0, 0, 0.08), (0.07, 0, 0.06))),
             Item("cup/body", ((0, 0, r + 0.01), (-r, 0, 0.055), handle), h),
             Item("other_cup/body", ((0, 0, r + 0.005), handle), h),
+            Item("decoy/body", ((0, 0, 0.03),)),
         ]
 
     @property

@@ -8,6 +8,7 @@ import numpy as np
 
 from imop.sim.parts.button import CAP, HOUSING, OUT_OF_ORDER, PRESSED, STROKE, spring_button, watch_order
 from imop.sim.parts.shapes import add_to
+from imop.sim.parts.solids import trinket
 from imop.sim.world import World
 from imop.tasks.colors import NAMED, random_color
 from imop.tasks.grasps import backed_off, from_above
@@ -48,11 +49,14 @@ class PressButtons(Task):
         self.radius, housing = rng.uniform(0.017, 0.026), random_color(rng, 0.0, 0.5)
         for i, color in enumerate((*colors, *others[: _BUTTONS - self.count])):
             add_to(spec, f"button{i}", spring_button(self.radius, NAMED[color], housing))
+        add_to(spec, "decoy", trinket("can", self.radius, rng.uniform(0.03, 0.06), NAMED[colors[0]]))
         for i in range(self.count - 1):
             watch_order(spec, f"order{i}", f"button{i}", f"button{i + 1}")
 
     def items(self) -> Sequence[Item]:
-        return [Item(f"button{i}/body", ((0, 0, 0.06 if i < self.count else 0.04),)) for i in range(_BUTTONS)]
+        rooms = [0.06 if i < self.count else 0.04 for i in range(_BUTTONS)]
+        buttons = [Item(f"button{i}/body", ((0, 0, room),)) for i, room in enumerate(rooms)]
+        return [*buttons, Item("decoy/body", ((0, 0, self.radius),))]
 
     def waypoints(self, world: World) -> Sequence[Waypoint]:
         press = from_above((0, 0, -0.85 * STROKE))

@@ -9,6 +9,7 @@ import numpy as np
 from imop.geometry import se3
 from imop.sim.parts.peg import PLATE, RingShape, peg, ring
 from imop.sim.parts.shapes import add_to
+from imop.sim.parts.solids import trinket
 from imop.sim.world import World
 from imop.tasks.colors import NAMED, random_color
 from imop.tasks.grasps import backed_off, from_above, shifted
@@ -25,7 +26,10 @@ _TIP = 0.005
 
 
 class RingOnPeg(Task):
-    """Take the ring by its grip; pegs of other colours and a ring of another colour distract."""
+    """Take the ring by its grip; pegs of other colours and a ring of another colour distract.
+
+    So does a can of the same colour.
+    """
 
     name = "tabletop/ring_on_peg"
     variations = len(COLORS)
@@ -55,6 +59,7 @@ class RingOnPeg(Task):
         add_to(spec, "peg", peg(self.shape, NAMED[color], wood))
         for i, other in enumerate(others):
             add_to(spec, f"other_peg{i}", peg(self.shape, NAMED[other], wood))
+        add_to(spec, "decoy", trinket("can", 0.02, rng.uniform(0.05, 0.08), NAMED[color]))
 
     def items(self) -> Sequence[Item]:
         r, grip = self.shape.outer, self.shape.grip
@@ -65,6 +70,7 @@ class RingOnPeg(Task):
             Item("ring/body", held),
             Item("other_ring/body", (held[0], (grip, 0.0, 0.03))),
             *(Item(f"other_peg{i}/body", (plate,)) for i in range(2)),
+            Item("decoy/body", ((0, 0, 0.02),)),
         ]
 
     def waypoints(self, world: World) -> Sequence[Waypoint]:
