@@ -12,6 +12,7 @@ from imop.evaluation.report import Count, Results
 from imop.evaluation.rollout import rollout
 from imop.evaluation.trials import Trial, demonstration_for, make_policy, suite_trials
 from imop.tasks.expert import ExpertFailed, perform
+from imop.tasks.layout import NoRoom
 from imop.types import Demonstration
 
 METHODS = ("replay", "registration", "oracle", "expert")
@@ -50,7 +51,7 @@ def evaluate_suite(
     results = dict(zip(every, parallel(work, jobs, console, "episodes"), strict=True))
     counts = {
         method: {
-            task: Count(sum(results[trial][method] for trial in of_task), len(of_task))
+            task: _count([results[trial][method] for trial in of_task if results[trial]])
             for task, of_task in trials.items()
         }
         for method in methods
@@ -59,8 +60,11 @@ def evaluate_suite(
 
 
 def outcomes(trial: Trial, demonstration: Demonstration, methods: Iterable[str]) -> dict[str, bool]:
-    """Success of each method in one scene."""
-    return {method: _succeeds(trial, demonstration, method) for method in methods}
+    """Success of each method in one scene; empty if the objects of the scene find no place."""
+    try:
+        return {method: _succeeds(trial, demonstration, method) for method in methods}
+    except NoRoom:
+        return {}
 
 
 def _succeeds(trial: Trial, demonstration: Demonstration, method: str) -> bool:
@@ -78,6 +82,10 @@ def _succeeds(trial: Trial, demonstration: Demonstration, method: str) -> bool:
     except ImopError:
         # What a policy cannot handle it has failed at; the other methods and scenes go on.
         return False
+
+
+def _count(successes: list[bool]) -> Count:
+    return Count(sum(successes), len(successes))
 
 
 def _shared(trial: Trial) -> tuple[str, int, int]:

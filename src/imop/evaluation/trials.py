@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from rich.table import Table
 
-from imop.errors import InvalidInput
+from imop.errors import ImopError, InvalidInput
 from imop.evaluation.oracle import OraclePolicy
 from imop.evaluation.rollout import Policy
 from imop.geometry.perception import Perception
@@ -15,6 +15,7 @@ from imop.sim.robot import panda_self_filter
 from imop.sim.world import World
 from imop.tasks.env import ImopEnv, make_env, make_task
 from imop.tasks.expert import ExpertFailed, record_demonstration
+from imop.tasks.layout import NoRoom
 from imop.tasks.tabletop import TABLETOP
 from imop.tasks.task import Task
 from imop.types import Demonstration
@@ -60,13 +61,14 @@ def demonstration_for(trial: Trial) -> Demonstration:
 
     Raises:
         ExpertFailed: if the expert succeeds in none of the scenes it may choose from.
+        NoRoom: if not even a scene was found.
     """
     task = make_task(trial.task)
     for seed in range(DEMONSTRATION_SEED, DEMONSTRATION_SEED + _RECORDING_ATTEMPTS):
         try:
             return record_demonstration(task, seed, trial.variation, trial.instance)
-        except ExpertFailed as error:
-            failure = error
+        except (ExpertFailed, NoRoom) as error:
+            failure: ImopError = error
     raise failure
 
 
