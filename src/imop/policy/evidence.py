@@ -103,14 +103,13 @@ class Surface:
             hidden &= ~(inside & np.isfinite(depth) & (depth > z - self.tolerances.depth))
         return hidden
 
-    def share(self, cloud: PointCloud, weight: FloatArray, T: FloatArray) -> float:
-        """The weighted share 0 .. 1 of the moved `cloud` that is explained; hidden points cost less."""
-        explained, _ = self.explain(cloud, T)
+    def share(self, cloud: PointCloud, weight: FloatArray, T: FloatArray, explained: FloatArray) -> float:
+        """Weighted share 0 .. 1 of the moved `cloud` that is `explained` (M,); hidden points cost less."""
         open_points = np.flatnonzero(explained < 0.5)
-        possible = weight.copy()
         doubtful = cloud.select(open_points)
         assert doubtful.normals is not None
         hidden = self.hides(se3.apply(T, doubtful.points), se3.rotate(T, doubtful.normals))
+        possible = weight.copy()
         possible[open_points[hidden]] *= self.tolerances.hidden
         return float(np.clip((weight * explained).sum() / max(possible.sum(), 1e-9), 0.0, 1.0))
 
@@ -128,30 +127,29 @@ class Judge:
     """
 
     def __init__(self, region: Surface, weight: FloatArray, query: Surface) -> None:
-        self._region, self._weight, self._query = region, weight, query
-        self._coarse = farthest_points(region.cloud.points, 120)
-        self._fine = farthest_points(region.cloud.points, 1000)
+        self._region, self._query = region, query
+        coarse, fine = (farthest_points(region.cloud.points, count) for count in (120, 1000))
+        self._coarse, self._coarse_weight = region.cloud.select(coarse), weight[coarse]
+        self._fine, self._fine_weight = region.cloud.select(fine), weight[fine]
         self._around = query.cloud.select(farthest_points(query.cloud.points, 1000))
 
     def glance(self, T_query_support: FloatArray) -> float:
         """A quick forward score, 0 .. 1."""
-        coarse = self._region.cloud.select(self._coarse)
-        return self._query.share(coarse, self._weight[self._coarse], T_query_support)
+        explained, _ = self._query.explain(self._coarse, T_query_support)
+        return self._query.share(self._coarse, self._coarse_weight, T_query_support, explained)
 
     def judge(self, T_query_support: FloatArray) -> Hypothesis:
         """The motion as a hypothesis, scored in both directions."""
-        region = self._region.cloud.select(self._fine)
-        forward = self._query.share(region, self._weight[self._fine], T_query_support)
-        T_support_query = se3.invert(T_query_support)
-        around = self._around.select(self._region.near(se3.apply(T_support_query, self._around.points)))
-        backward = self._region.share(around, np.ones(len(around)), T_support_query)
+        explained, counterpart = self._query.explain(self._fine, T_query_support)
+        forward = self._query.share(self._fine, self._fine_weight, T_query_support, explained)
         part = self._query.tolerances.backward
-        return self._matched((1 - part) * forward + part * backward, T_query_support)
-
-    def _matched(self, score: float, T_query_support: FloatArray) -> Hypothesis:
-        region = self._region.cloud.select(self._fine)
-        explained, counterpart = self._query.explain(region, T_query_support)
+        score = (1 - part) * forward + part * self._backward(se3.invert(T_query_support))
         good = explained > 0.3
-        return Hypothesis(
-            T_query_support, score, region.points[good], self._query.cloud.points[counterpart[good]]
-        )
+        p_query = self._query.cloud.points[counterpart[good]]
+        return Hypothesis(T_query_support, score, self._fine.points[good], p_query)
+
+    def _backward(self, T_support_query: FloatArray) -> float:
+        near = self._region.near(se3.apply(T_support_query, self._around.points))
+        around = self._around.select(near)
+        explained, _ = self._region.explain(around, T_support_query)
+        return self._region.share(around, np.ones(len(around)), T_support_query, explained)

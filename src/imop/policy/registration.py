@@ -22,6 +22,8 @@ from imop.types import FloatArray
 FINISHED = 4
 # Things do not lean: a motion that tilts by this angle (radians) or more is as unlikely as any other tilt.
 TILTED = 0.17
+# Motions nearer to each other than this, metres and radians, are judged once.
+SAME_MOTION = (0.001, 0.01)
 # Farther off (metres) than this is another place.
 ELSEWHERE = 0.03
 
@@ -110,6 +112,9 @@ class RegisteredStep:
         found = [judge.judge(T) for T in likely]
         found += [judge.judge(refine(self._coarse, T)) for T in [*likely, *seeds]]
         found.sort(key=lambda hypothesis: -hypothesis.score)
+        # Many seeds end in the same place.
+        motions = np.stack([hypothesis.T_query_support for hypothesis in found])
+        found = [found[i] for i in distinct(motions, self._center, len(found), *SAME_MOTION)]
         # The last half millimetre is worth looking for only where it matters.
         finished = [refine(self._fine, h.T_query_support, FINEST) for h in found[:FINISHED]]
         found += [judge.judge(T) for T in finished]
