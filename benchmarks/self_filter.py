@@ -6,7 +6,6 @@ filter itself sees joint positions and gripper opening only.
     python benchmarks/self_filter.py --demos ../shared/data/rlbench_demos --json self_filter.json
 """
 
-import json
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from imop.demos.rlbench import episodes, read_episode
+from imop.evaluation.report import save_json
 from imop.geometry.cloud import unproject
 from imop.geometry.perception import WORKSPACE_LOWER, WORKSPACE_UPPER
 from imop.geometry.self_filter import SelfFilter
@@ -26,7 +26,9 @@ from imop.types import BoolArray, CameraView, FloatArray, Observation
 
 # RLBench's instance ids of the fingers, the hand and the links.
 ROBOT_IDS = (31, 34, 35, *range(39, 47))
+# Points this near to the tip of a gripper less open than this are what it holds, metres and fraction.
 HELD_RADIUS = 0.03
+CLOSED = 0.5
 
 
 @dataclass
@@ -74,22 +76,24 @@ def observations(demos: Path) -> Iterator[tuple[Observation, FloatArray]]:
 
 
 def measure(self_filter: SelfFilter, demos: Path) -> dict[str, Count]:
-    """Counts of removed points: of the robot, of all others, and of what the closed fingers hold."""
-    names = ("robot", "others", "robot, workspace", "others, workspace", "held")
-    counts = {name: Count() for name in names}
+    """Counts of removed points: of the robot, of all others, and of what the closed fingers hold.
+
+    Points count within the workspace, and once more wherever they are.
+    """
+    counts = {name: Count() for name in ("robot", "other", "held", "robot_anywhere", "other_anywhere")}
     for observation, q in observations(demos):
         opening = observation.gripper_opening
         for view in observation.views.values():
             points, robot = labelled(view)
             removed = self_filter.is_robot(points, q, opening)
             inside = np.all((points >= WORKSPACE_LOWER) & (points <= WORKSPACE_UPPER), axis=1)
-            tip = observation.T_world_gripper[:3, 3]
-            near = np.linalg.norm(points - tip, axis=1) < HELD_RADIUS
-            counts["robot"].add(removed, robot)
-            counts["others"].add(removed, ~robot)
-            counts["robot, workspace"].add(removed, robot & inside)
-            counts["others, workspace"].add(removed, ~robot & inside)
-            if opening < 0.5:
+            counts["robot"].add(removed, robot & inside)
+            counts["other"].add(removed, ~robot & inside)
+            counts["robot_anywhere"].add(removed, robot)
+            counts["other_anywhere"].add(removed, ~robot)
+            if opening < CLOSED:
+                tip = observation.T_world_gripper[:3, 3]
+                near = np.linalg.norm(points - tip, axis=1) < HELD_RADIUS
                 counts["held"].add(removed, ~robot & near)
     return counts
 
@@ -124,8 +128,9 @@ def main(options: Options) -> None:
         table.add_row(name, str(count.removed), str(count.total), f"{count.fraction:.3%}")
     Console().print(table, f"{seconds * 1e3:.0f} ms per 50k points")
     if options.json:
-        results = {name: {**vars(count), "fraction": count.fraction} for name, count in counts.items()}
-        options.json.write_text(json.dumps({"removed": results, "seconds_per_50k_points": seconds}, indent=2))
+        results = {f"{name}_removed": count.fraction for name, count in counts.items()}
+        results |= {f"{name}_points": count.total for name, count in counts.items()}
+        save_json(results | {"seconds_per_50k_points": seconds}, options.json)
 
 
 if __name__ == "__main__":
