@@ -14,9 +14,10 @@ from torch import nn
 
 from imop.errors import CorruptData
 from imop.files import replaced
-from imop.networks.graph import GraphConfig
+from imop.networks.backbone import BackboneConfig
+from imop.networks.graph import POINT_FEATURES, GraphConfig
 from imop.networks.matching import MatchingConfig, MatchingNetwork
-from imop.networks.region import RegionConfig, RegionNetwork
+from imop.networks.region import GRIPPER_FEATURES, RegionConfig, RegionNetwork
 from imop.networks.routing import RoutingConfig, RoutingNetwork
 
 VERSION = 1
@@ -32,6 +33,28 @@ class ModelConfig:
     region: RegionConfig = field(default_factory=RegionConfig)
     matching: MatchingConfig = field(default_factory=MatchingConfig)
     routing: RoutingConfig = field(default_factory=RoutingConfig)
+
+
+SMALL = ModelConfig()
+
+PAPER = ModelConfig(
+    GraphConfig(voxel=0.005, plane_voxel=0.02, max_points=5000, grids=(0.015, 0.03), neighbours=16),
+    RegionConfig(
+        BackboneConfig(POINT_FEATURES + GRIPPER_FEATURES, (256, 384, 512), (2, 4, 2), group_width=16),
+        stages=4,
+    ),
+    MatchingConfig(
+        BackboneConfig(widths=(256, 384, 512), depths=(2, 3, 2), group_width=16),
+        attention="graph",
+        neighbours=16,
+        heads=8,
+        max_region=1000,
+    ),
+    RoutingConfig(
+        BackboneConfig(widths=(128, 256, 512), depths=(2, 2, 5), group_width=16), width=512, layers=4, heads=8
+    ),
+)
+"""The paper's size, 80.8 M parameters in all; how they are spread over the networks it does not say."""
 
 
 class Model(nn.Module):
