@@ -137,6 +137,8 @@ def show(results: dict[str, dict[str, Any]], console: Console) -> None:
 def main() -> int:
     options = tyro.cli(Options, description=__doc__)
     console = Console()
+    # A pipe has no width of its own; the table needs 120 columns.
+    console = console if console.is_terminal else Console(width=120)
     started = time.perf_counter()
     try:
         work = pairs(episodes(options.demos))
