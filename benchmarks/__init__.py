@@ -1,0 +1,1 @@
+"""One script per reported table or ratio."""

@@ -1,7 +1,7 @@
 """imop: a robot arm learns a manipulation task from one demonstration, without retraining.
 
-The public names stand in __init__.pyi; each is imported when it is first used, so that `imop --help` waits for
-neither torch nor MuJoCo.
+The public names stand in __init__.pyi; each is imported when it is first used, so that `imop --help` waits
+for neither torch nor MuJoCo.
 """
 
 import lazy_loader
