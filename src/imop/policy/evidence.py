@@ -20,6 +20,7 @@ class Tolerances:
     Attributes:
         reach: farthest counterpart, metres; about twice the spacing of the pixels on the scene.
         offset: standard deviation of the distance from the counterpart's tangent plane, metres.
+        along: the same along that plane, metres; it tells where a face ends.
         shade: standard deviation of the difference of two shades, see `shades`.
         depth: how far behind a point a camera must see to prove it absent, metres.
         grazing: cosine of the angle to its normal from which a camera sees a face at all.
@@ -30,6 +31,7 @@ class Tolerances:
 
     reach: float = 0.015
     offset: float = 0.005
+    along: float = 0.008
     shade: float = 0.25
     depth: float = 0.02
     grazing: float = 0.25
@@ -72,7 +74,10 @@ class Surface:
         offset = np.einsum("mk,mk->m", normals, points - self.cloud.points[index])
         facing = np.einsum("mk,mk->m", normals, se3.rotate(T, cloud.normals))
         shade = np.linalg.norm(shades(cloud.colors) - self._shades[index], axis=1)
-        error = (offset / self.tolerances.offset) ** 2 + (shade / self.tolerances.shade) ** 2
+        along = np.sqrt(np.maximum(np.where(found, distance, 0.0) ** 2 - offset**2, 0.0))
+        tolerances = self.tolerances
+        error = (offset / tolerances.offset) ** 2 + (shade / tolerances.shade) ** 2
+        error += (along / tolerances.along) ** 2
         agreement = np.where(found, np.exp(-0.5 * error) * np.clip(facing, 0.0, 1.0), 0.0)
         return agreement, index
 
@@ -92,7 +97,8 @@ class Surface:
         for T_camera_world, view in self._views:
             p_camera, n_camera = se3.apply(T_camera_world, points), se3.rotate(T_camera_world, normals)
             z = p_camera[:, 2]
-            slant = -np.einsum("mk,mk->m", p_camera, n_camera) / np.linalg.norm(p_camera, axis=1)
+            distance = np.maximum(np.linalg.norm(p_camera, axis=1), 1e-9)
+            slant = -np.einsum("mk,mk->m", p_camera, n_camera) / distance
             in_front = (z > 1e-3) & (slant > self.tolerances.grazing)
             uvw = p_camera @ view.intrinsics.T
             uv = np.round(uvw[:, :2] / np.where(in_front, z, 1.0)[:, None]).astype(np.int64)
