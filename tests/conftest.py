@@ -22,5 +22,5 @@ def rlbench_demos() -> Path:
     """Folder of real RLBench demonstrations, which may not be redistributed."""
     path = SHARED / "data" / "rlbench_demos"
     if not path.is_dir():
-        pytest.skip("real RLBench demonstrations may not be redistributed; looked for ../shared/data/rlbench_demos")
+        pytest.skip(f"real RLBench demonstrations may not be redistributed; looked for {path}")
     return path
