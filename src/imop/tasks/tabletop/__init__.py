@@ -5,6 +5,7 @@ Networks train on the base tasks and are tested on the novel ones, which share n
 
 from imop.tasks.tabletop.close_jar import CloseJar
 from imop.tasks.tabletop.cup_on_hook import CupOnHook
+from imop.tasks.tabletop.grocery_in_cupboard import GroceryInCupboard
 from imop.tasks.tabletop.item_in_drawer import ItemInDrawer
 from imop.tasks.tabletop.lid_off_pot import LidOffPot
 from imop.tasks.tabletop.open_drawer import OpenDrawer
@@ -29,7 +30,9 @@ NOVEL: dict[str, type[Task]] = {
     "tabletop/rubbish_in_bin": RubbishInBin,
 }
 
-CROSS_OBJECT: dict[str, type[Task]] = {}
+CROSS_OBJECT: dict[str, type[Task]] = {
+    "tabletop/grocery_in_cupboard": GroceryInCupboard,
+}
 """Demonstrated with one object, tried with another."""
 
 TABLETOP: dict[str, type[Task]] = {**BASE, **NOVEL, **CROSS_OBJECT}
