@@ -4,10 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from hypothesis import settings
 
 settings.register_profile("imop", deadline=None, max_examples=40, derandomize=True)
 settings.load_profile("imop")
+
+# Tests run in parallel processes, whose threads would only wait for each other.
+torch.set_num_threads(1)
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
