@@ -67,26 +67,39 @@ def run(
 def collect(
     out: Path,
     suite: str = "tabletop",
+    split: Literal["base", "novel", "cross_object", "all"] = "all",
     tasks: tuple[str, ...] = (),
     episodes: int = 10,
     seed: int = 0,
     jobs: int = 2,
+    cluster: str | None = None,
 ) -> int:
     """Record demonstrations by the expert into a store, every task and variation.
 
-    Args:
-        out: folder of the store; an existing one is appended to.
-        suite: which suite.
-        tasks: names within the suite; all if none is given.
-        episodes: demonstrations per task and variation.
-        seed: first seed of the scenes.
-        jobs: parallel processes.
-    """
-    from imop.evaluation.collect import collect_suite
+    Episodes that are in the store already are not recorded again, so a run that was stopped is continued by
+    starting it again. Neither that nor the number of processes changes what the store will contain. Writes a
+    report beside the store.
 
-    recorded, failed = collect_suite(out, suite, tasks, episodes, seed, jobs, console)
-    console.print(f"{recorded} demonstrations in {out}; {failed} expert attempts failed and were repeated")
-    return 0
+    Args:
+        out: folder of the store; an existing one is continued.
+        suite: which suite.
+        split: which of its tasks.
+        tasks: names within the split; all if none is given.
+        episodes: demonstrations per task and variation, each with its own objects and scene.
+        seed: number of the first episode; other numbers give other objects and scenes.
+        jobs: parallel processes on this machine.
+        cluster: address of a Ray cluster to work on instead, such as auto or 10.0.0.1:6379.
+    """
+    from imop.evaluation.collect import collect as collect_into
+    from imop.evaluation.splits import chosen_tasks
+
+    done = collect_into(out, chosen_tasks(suite, split, tasks), episodes, seed, jobs, console, cluster)
+    total, failed = sum(done.episodes.values()), sum(done.failed_attempts.values())
+    console.print(f"{total} demonstrations in {out}, {done.recorded} of them new in {done.seconds:.0f} s")
+    console.print(f"{failed} expert attempts failed and were repeated with another seed")
+    for what in done.given_up:
+        console.print(f"[red]given up[/]: {what}")
+    return 1 if done.given_up else 0
 
 
 @app.command(name="eval")
