@@ -3,7 +3,9 @@
 Networks train on the base tasks and are tested on the novel ones, which share no kind of object with them.
 """
 
+from imop.tasks.tabletop.book_in_shelf import BookInShelf
 from imop.tasks.tabletop.close_jar import CloseJar
+from imop.tasks.tabletop.close_laptop import CloseLaptop
 from imop.tasks.tabletop.cup_on_hook import CupOnHook
 from imop.tasks.tabletop.grocery_in_cupboard import GroceryInCupboard
 from imop.tasks.tabletop.item_in_drawer import ItemInDrawer
@@ -28,6 +30,8 @@ BASE: dict[str, type[Task]] = {
 NOVEL: dict[str, type[Task]] = {
     "tabletop/lid_off_pot": LidOffPot,
     "tabletop/rubbish_in_bin": RubbishInBin,
+    "tabletop/close_laptop": CloseLaptop,
+    "tabletop/book_in_shelf": BookInShelf,
 }
 
 CROSS_OBJECT: dict[str, type[Task]] = {
