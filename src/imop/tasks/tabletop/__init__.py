@@ -10,6 +10,7 @@ from imop.tasks.tabletop.cup_on_hook import CupOnHook
 from imop.tasks.tabletop.grocery_in_cupboard import GroceryInCupboard
 from imop.tasks.tabletop.item_in_drawer import ItemInDrawer
 from imop.tasks.tabletop.lid_off_pot import LidOffPot
+from imop.tasks.tabletop.open_box import OpenBox
 from imop.tasks.tabletop.open_drawer import OpenDrawer
 from imop.tasks.tabletop.press_buttons import PressButtons
 from imop.tasks.tabletop.ring_on_peg import RingOnPeg
@@ -32,6 +33,7 @@ NOVEL: dict[str, type[Task]] = {
     "tabletop/rubbish_in_bin": RubbishInBin,
     "tabletop/close_laptop": CloseLaptop,
     "tabletop/book_in_shelf": BookInShelf,
+    "tabletop/open_box": OpenBox,
 }
 
 CROSS_OBJECT: dict[str, type[Task]] = {
