@@ -7,7 +7,7 @@ from imop import DemonstrationStore
 from imop.cli import main
 from imop.evaluation.trials import Trial, demonstration_for
 
-VERBS = ("run", "collect", "eval", "import", "check", "predict", "tasks")
+VERBS = ("run", "collect", "eval", "import", "export", "check", "predict", "tasks")
 POT = "tabletop/lid_off_pot"
 
 

@@ -4,6 +4,7 @@ Exit codes: 0 done, 1 the task failed or the data have errors, 2 bad input.
 """
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -153,6 +154,28 @@ def import_(layout: Positional[Literal["rlbench"]], source: Positional[Path], ou
         source, out, track=lambda these: track(these, f"importing {source}", transient=True)
     )
     console.print(f"{count} demonstrations imported into {out}")
+    return 0
+
+
+@app.command
+def export(layout: Positional[Literal["rlbench"]], store: Positional[Path], out: Positional[Path]) -> int:
+    """Write a store in the layout of other programs.
+
+    Args:
+        layout: how it is laid out: rlbench as PerAct, RVT and Act3D read it.
+        store: the store.
+        out: a new folder, which gets one folder per task.
+    """
+    from rich.progress import track
+
+    from imop.demos.export import export_rlbench
+    from imop.demos.store import DemonstrationStore
+
+    def shown(numbers: range) -> Iterable[int]:
+        return track(numbers, f"exporting {store}", console=console, transient=True)
+
+    count = export_rlbench(DemonstrationStore.open(store), out, shown)
+    console.print(f"{count} demonstrations exported into {out}")
     return 0
 
 
