@@ -55,8 +55,8 @@ def hinged_box(shape: BoxShape, color: Color, lid_color: Color, tab_color: Color
     lid = body.add_body(name="lid", pos=shape.tab(0.0)[:3, 3])
     hinge(lid, "lid", (0, -1, 0), (0.0, WIDEST), pos=(-shape.arm, 0, 0), friction=0.05)
     box(lid, (-shape.arm, -y, -LID / 2), (-TAB_OUT, y, LID / 2), lid_color, WOOD)
-    out, side, up = _TAB
-    box(lid, (-out, -side, -up), _TAB, tab_color, WOOD)
+    out = _TAB[0]
+    box(lid, (-out, -_TAB[1], -_TAB[2]), _TAB, tab_color, WOOD)
     box(lid, (-TAB_OUT, -0.012, -0.003), (-out, 0.012, 0.003), tab_color, WOOD)
     spec.add_exclude(bodyname1="body", bodyname2="lid")
     return spec
