@@ -231,11 +231,28 @@ def predict(
 
 
 @app.command
-def tasks() -> int:
-    """List suites, tasks, variations and their instructions."""
-    from imop.evaluation.trials import tasks_table
+def tasks(
+    suite: str = "tabletop",
+    split: Literal["base", "novel", "cross_object", "all"] = "all",
+    contact_sheet: Path | None = None,
+    jobs: int = 2,
+) -> int:
+    """List tasks with their split, variations and instructions; draw them if wanted.
 
-    console.print(tasks_table())
+    Args:
+        suite: which suite.
+        split: which of its tasks.
+        contact_sheet: PNG file to draw every task in four scenes into.
+        jobs: parallel processes for the drawing.
+    """
+    from imop.evaluation.contact_sheet import save_contact_sheet, tasks_table
+    from imop.evaluation.splits import chosen_tasks
+
+    chosen = chosen_tasks(suite, split)
+    console.print(tasks_table(chosen, suite))
+    if contact_sheet is not None:
+        save_contact_sheet(chosen, contact_sheet, jobs, console)
+        console.print(contact_sheet, highlight=False)
     return 0
 
 
