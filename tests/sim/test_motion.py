@@ -8,9 +8,10 @@ import pytest
 
 from imop.errors import PlanFailed
 from imop.geometry import se3
+from imop.sim import motion
 from imop.sim.gripper import attach
 from imop.sim.motion import ACCELERATION, PERIOD, VELOCITY, Planner, Trajectory
-from imop.sim.robot import JOINT_LOWER, JOINT_UPPER, tip_pose
+from imop.sim.robot import JOINT_LOWER, JOINT_UPPER, PANDA_HOME_Q, tip_pose
 from imop.sim.world import TABLE_HEIGHT, World, allow_grasp, scene_spec
 from imop.types import FloatArray
 
@@ -192,3 +193,11 @@ def test_what_the_hand_holds_avoids_obstacles_too() -> None:
         pairs = world.model.geom_bodyid[world.data.contact.geom[world.data.contact.dist < 0]]
         names = [{world.model.body(int(i)).name for i in pair} for pair in pairs]
         assert {"plank", "post"} not in names
+
+
+def test_a_line_through_a_singularity_is_no_straight_path():
+    """Between its rows of joint positions, too, the tip has to stay on the line."""
+    straight = np.linspace(PANDA_HOME_Q, PANDA_HOME_Q + 0.02, 5)
+    swinging = straight.copy()
+    swinging[2, 0] += 0.2
+    assert motion._off_line(straight) < 0.002 < motion._off_line(swinging)

@@ -19,7 +19,7 @@ from imop.errors import PlanFailed
 from imop.geometry import se3
 from imop.sim.collision import CollisionChecker, densify
 from imop.sim.kinematics import follow, inverse_kinematics, line
-from imop.sim.robot import JOINT_LOWER, JOINT_UPPER, JOINT_VELOCITY
+from imop.sim.robot import JOINT_LOWER, JOINT_UPPER, JOINT_VELOCITY, tip_pose
 from imop.sim.world import World
 from imop.types import FloatArray, as_pose
 
@@ -34,6 +34,7 @@ PERIOD = 0.01
 
 _LINE_STEP, _LINE_TURN = 0.01, 0.05
 _MAX_JOINT_STEP = 0.25
+_OFF_LINE = 0.002
 _MAX_CHECKS = 30_000
 _MAX_GOALS = 8
 _GOAL_DISTANCE = 0.3
@@ -125,9 +126,9 @@ class Planner:
         if rows is None:
             return None
         path = np.concatenate([q_start[None], rows])
-        if np.abs(np.diff(path, axis=0)).max() > _MAX_JOINT_STEP or not checker.valid_motion(path):
+        if np.abs(np.diff(path, axis=0)).max() > _MAX_JOINT_STEP or _off_line(path) > _OFF_LINE:
             return None
-        return path
+        return path if checker.valid_motion(path) else None
 
     def _search(
         self, q_start: FloatArray, goals: FloatArray, checker: CollisionChecker, deadline: float
@@ -210,6 +211,16 @@ def _state(space: Any, q: FloatArray) -> Any:
 
 def _row(state: Any) -> FloatArray:
     return np.array([state[i] for i in range(7)])
+
+
+def _off_line(path: FloatArray) -> float:
+    """How far the tip leaves the straight line halfway between two rows of joint positions, at most, metres.
+
+    Near a singularity the rows lie on the line although the arm swings wide between them.
+    """
+    p_rows = np.stack([tip_pose(q)[:3, 3] for q in path])
+    p_between = np.stack([tip_pose(q)[:3, 3] for q in (path[1:] + path[:-1]) / 2])
+    return float(np.linalg.norm(p_between - (p_rows[1:] + p_rows[:-1]) / 2, axis=1).max())
 
 
 def _timed(path: FloatArray, checker: CollisionChecker) -> TimedPath:
