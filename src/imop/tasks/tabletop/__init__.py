@@ -16,6 +16,7 @@ from imop.tasks.tabletop.press_buttons import PressButtons
 from imop.tasks.tabletop.ring_on_peg import RingOnPeg
 from imop.tasks.tabletop.rubbish_in_bin import RubbishInBin
 from imop.tasks.tabletop.stack_cubes import StackCubes
+from imop.tasks.tabletop.straighten_rope import StraightenRope
 from imop.tasks.tabletop.turn_faucet import TurnFaucet
 from imop.tasks.task import Task
 
@@ -36,6 +37,7 @@ NOVEL: dict[str, type[Task]] = {
     "tabletop/turn_faucet": TurnFaucet,
     "tabletop/book_in_shelf": BookInShelf,
     "tabletop/open_box": OpenBox,
+    "tabletop/straighten_rope": StraightenRope,
 }
 
 CROSS_OBJECT: dict[str, type[Task]] = {
