@@ -35,6 +35,8 @@ def hinge(
         range=list(np.degrees(limits)),  # a spec is written in degrees
         limited=mujoco.mjtLimited.mjLIMITED_TRUE,
         frictionloss=friction,
+        # Friction of MuJoCo's default softness lets a heavy lid creep.
+        solimp_friction=[0.995, 0.999, 0.001, 0.5, 2],
         damping=damping,
         armature=0.002,
     )
