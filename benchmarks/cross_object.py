@@ -2,7 +2,7 @@
 
     python benchmarks/cross_object.py --method registration --json cross_object.json
 
-Rows are what was shown, columns what was tried. The cupboard has one size; its colours differ.
+Rows are what was shown, columns what was tried. The cupboard's width and colours differ.
 """
 
 import sys

@@ -44,12 +44,12 @@ def test_the_longest_grocery_fits_into_the_cupboard():
     longest = max(kind.height for kind in GROCERIES)
     assert longest < cupboard.DEPTH and max(kind.length for kind in GROCERIES) < cupboard.HEIGHT
     scene = mujoco.MjSpec()
-    add_to(scene, "it", cupboard.open_cupboard((1, 1, 1), (1, 1, 1)))
+    add_to(scene, "it", cupboard.open_cupboard(0.3, (1, 1, 1), (1, 1, 1)))
     model = scene.compile()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     start, met = np.array([-0.1, 0, 0.1]), np.zeros(1, dtype=np.int32)
     directions = np.array([(-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1), (1, 0, 0)], dtype=float)
     free = [mujoco.mj_ray(model, data, start, d, None, True, -1, met, None) for d in directions]
-    half = cupboard.WIDTH / 2
+    half = 0.15
     assert np.allclose(free, (cupboard.DEPTH - 0.1, half, half, cupboard.HEIGHT - 0.1, 0.1, -1))

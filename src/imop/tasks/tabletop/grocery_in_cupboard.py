@@ -38,7 +38,7 @@ class GroceryInCupboard(Task):
     """Pick the variation's grocery from above by its top, and lay it into the cupboard, bottom first.
 
     Frames and grasps are the same for all groceries, so what was shown with one can be tried with another.
-    The cupboard has one size; its colours and the shade of the pack belong to the instance.
+    The cupboard's width and colours and the shade of the pack belong to the instance.
     """
 
     name = "tabletop/grocery_in_cupboard"
@@ -56,12 +56,13 @@ class GroceryInCupboard(Task):
     def build(self, spec: Any, variation: int, rng: np.random.Generator) -> None:
         self.kind = GROCERIES[variation]
         wood = np.asarray(random_color(rng, 0.35))
-        add_to(spec, "cupboard", cupboard.open_cupboard(tuple(wood), tuple(0.8 * wood)))
+        self.width = rng.uniform(0.28, 0.32)
+        add_to(spec, "cupboard", cupboard.open_cupboard(self.width, tuple(wood), tuple(0.8 * wood)))
         shade = rng.uniform(-0.06, 0.06, size=3)
         add_to(spec, "grocery", grocery(self.kind, tuple(shade)))
 
     def items(self) -> Sequence[Item]:
-        deep, wide = cupboard.DEPTH + cupboard.BOARD, cupboard.WIDTH / 2 + cupboard.BOARD
+        deep, wide = cupboard.DEPTH + cupboard.BOARD, self.width / 2 + cupboard.BOARD
         back, side = -deep + 0.075, wide - 0.075
         case = tuple((x, y, 0.106) for x in (back, -0.075) for y in (-side, 0.0, side))
         approach = tuple((x, 0.0, 0.08) for x in (0.08, 0.20))
@@ -86,6 +87,6 @@ class GroceryInCupboard(Task):
     def success(self, world: World) -> bool:
         T_cupboard_grocery = se3.invert(world.pose("cupboard/body")) @ world.pose("grocery/body")
         ends = se3.apply(T_cupboard_grocery, np.array([[0, 0, 0], [0, 0, -self.kind.height]]))
-        lower = np.array([-cupboard.DEPTH, -cupboard.WIDTH / 2, -0.002])
-        upper = np.array([0.0, cupboard.WIDTH / 2, cupboard.HEIGHT])
+        lower = np.array([-cupboard.DEPTH, -self.width / 2, -0.002])
+        upper = np.array([0.0, self.width / 2, cupboard.HEIGHT])
         return not world.held and bool(np.all((ends > lower) & (ends < upper)))
