@@ -16,10 +16,10 @@ import tyro
 from joblib import delayed
 from rich.console import Console
 
-from imop.errors import ImopError, InvalidInput
+from imop.errors import ImopError
 from imop.evaluation.benchmark import parallel
 from imop.evaluation.report import Count, Results, save_json
-from imop.evaluation.trials import SUITES
+from imop.evaluation.splits import chosen_tasks
 from imop.tasks.env import make_task
 from imop.tasks.expert import record_demonstration
 
@@ -66,21 +66,11 @@ def attempt(name: str, seed: int) -> Attempt:
     return Attempt(name, seed, problem, time.perf_counter() - started)
 
 
-def chosen(options: Options) -> list[str]:
-    """Full names of the tasks to try."""
-    if options.suite not in SUITES:
-        raise InvalidInput("suite", options.suite, ", ".join(SUITES))
-    names = [f"{options.suite}/{task}" for task in options.tasks] or list(SUITES[options.suite])
-    for name in names:
-        make_task(name)
-    return names
-
-
 def main() -> int:
     options = tyro.cli(Options, description=__doc__)
     console = Console()
     try:
-        names = chosen(options)
+        names = chosen_tasks(options.suite, "all", options.tasks)
     except InvalidInput as error:
         console.print(f"[red]{error}")
         return 2

@@ -106,6 +106,7 @@ def collect(
 @app.command(name="eval")
 def evaluate(
     suite: str = "tabletop",
+    split: str = "all",
     tasks: tuple[str, ...] = (),
     methods: Annotated[str, tyro.conf.arg(metavar="NAME,NAME")] = "replay,registration,oracle,expert",
     episodes: int = 25,
@@ -120,7 +121,8 @@ def evaluate(
 
     Args:
         suite: which suite.
-        tasks: names within the suite; all if none is given.
+        split: base, novel, cross_object or all.
+        tasks: names within the split; all if none is given.
         methods: any of replay, registration, oracle (true object poses), expert, joined by commas.
         episodes: scenes per task, spread over its variations.
         seed: first seed of the scenes.
@@ -130,7 +132,7 @@ def evaluate(
     """
     from imop.evaluation.benchmark import evaluate_suite
 
-    results = evaluate_suite(suite, tasks, methods.split(","), episodes, seed, instance, jobs, console)
+    results = evaluate_suite(suite, split, tasks, methods.split(","), episodes, seed, instance, jobs, console)
     results.save(out)
     console.print(results.table())
     console.print(f"{out / 'report.md'}\n{out / 'results.json'}", highlight=False)

@@ -29,6 +29,7 @@ NOTES = (
 
 def evaluate_suite(
     suite: str,
+    split: str,
     tasks: tuple[str, ...],
     methods: list[str],
     episodes: int,
@@ -40,11 +41,11 @@ def evaluate_suite(
     """Try every method in the same `episodes` scenes of every task.
 
     Raises:
-        InvalidInput: for an unknown suite, task or method.
+        InvalidInput: for an unknown suite, split, task or method.
     """
     if unknown := [method for method in methods if method not in METHODS]:
         raise InvalidInput("methods", unknown[0], ", ".join(METHODS))
-    trials = suite_trials(suite, tasks, episodes, seed, instance)
+    trials = suite_trials(suite, split, tasks, episodes, seed, instance)
     every = [trial for of_task in trials.values() for trial in of_task]
     shown = _demonstrations(every, jobs, console)
     work = [delayed(outcomes)(trial, shown[_shared(trial)], methods) for trial in every]
@@ -56,7 +57,7 @@ def evaluate_suite(
         }
         for method in methods
     }
-    return Results(suite, "all" if not tasks else ",".join(tasks), seed, counts, NOTES)
+    return Results(suite, ",".join(tasks) or split, seed, counts, NOTES)
 
 
 def outcomes(trial: Trial, demonstration: Demonstration, methods: Iterable[str]) -> dict[str, bool]:

@@ -2,11 +2,10 @@
 
 from dataclasses import dataclass
 
-from rich.table import Table
-
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.oracle import OraclePolicy
 from imop.evaluation.rollout import Policy
+from imop.evaluation.splits import SPLITS, chosen_tasks
 from imop.geometry.perception import Perception
 from imop.policy.baselines import ReplayPolicy
 from imop.policy.one_shot import OneShotPolicy
@@ -16,11 +15,7 @@ from imop.sim.world import World
 from imop.tasks.env import ImopEnv, make_env, make_task
 from imop.tasks.expert import ExpertFailed, record_demonstration
 from imop.tasks.layout import NoRoom
-from imop.tasks.tabletop import TABLETOP
-from imop.tasks.task import Task
 from imop.types import Demonstration
-
-SUITES: dict[str, dict[str, type[Task]]] = {"tabletop": TABLETOP}
 
 DEMONSTRATION_SEED = 1_000_000
 """Demonstrations are recorded in scenes of this seed and above, and never tested there."""
@@ -73,24 +68,21 @@ def demonstration_for(trial: Trial) -> Demonstration:
 
 
 def suite_trials(
-    suite: str, tasks: tuple[str, ...], episodes: int, seed: int, instance: int
+    suite: str, split: str, tasks: tuple[str, ...], episodes: int, seed: int, instance: int
 ) -> dict[str, list[Trial]]:
-    """`episodes` scenes for each task, with the task's variations in turn.
+    """`episodes` scenes for each task, by its name within the suite, with the task's variations in turn.
 
     Raises:
-        InvalidInput: for an unknown suite or task, or no episodes.
+        InvalidInput: for an unknown suite, split or task, or no episodes.
     """
-    if suite not in SUITES:
-        raise InvalidInput("suite", suite, ", ".join(SUITES))
-    names = {name.split("/")[1]: (name, task.variations) for name, task in SUITES[suite].items()}
-    if unknown := [name for name in tasks if name not in names]:
-        raise InvalidInput("tasks", unknown[0], ", ".join(names))
     if episodes < 1:
         raise InvalidInput("episodes", f"{episodes}", "at least 1")
-    chosen = {short: names[short] for short in tasks or names}
     return {
-        short: [Trial(name, seed + i, i % variations, instance) for i in range(episodes)]
-        for short, (name, variations) in chosen.items()
+        name.removeprefix(f"{suite}/"): [
+            Trial(name, seed + i, i % SPLITS[suite]["all"][name].variations, instance)
+            for i in range(episodes)
+        ]
+        for name in chosen_tasks(suite, split, tasks)
     }
 
 
@@ -113,14 +105,3 @@ def make_policy(method: str, world: World | None = None, min_confidence: float =
     if method == "oracle" and world is not None:
         return OraclePolicy(world)
     raise InvalidInput("method", method, "replay, registration, or (in simulation) oracle")
-
-
-def tasks_table() -> Table:
-    """Suites, tasks, numbers of variations and the instructions of the first variation."""
-    table = Table()
-    for column in ("task", "variations", "instruction"):
-        table.add_column(column)
-    for suite in SUITES.values():
-        for name, task in suite.items():
-            table.add_row(name, str(task.variations), task().instructions(0)[0])
-    return table
