@@ -16,7 +16,7 @@ import tyro
 from joblib import delayed
 from rich.console import Console
 
-from imop.errors import ImopError
+from imop.errors import ImopError, InvalidInput
 from imop.evaluation.benchmark import parallel
 from imop.evaluation.report import Count, Results, save_json
 from imop.evaluation.splits import chosen_tasks
