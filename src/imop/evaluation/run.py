@@ -13,7 +13,7 @@ from imop.evaluation.rollout import Rollout, rollout
 from imop.evaluation.trials import Trial, make_policy
 from imop.evaluation.video import save_video
 from imop.geometry import se3
-from imop.sim.cameras import Camera, render_view
+from imop.sim.cameras import look_at, render_view
 from imop.sim.world import World
 from imop.types import Action, ByteArray, Demonstration, FloatArray, Observation
 
@@ -22,15 +22,7 @@ VIDEO_STRIDE = 2
 """Every second frame of 0.05 simulated seconds is drawn, and shown at twice the real speed."""
 
 
-def _looking_at(target: FloatArray, position: FloatArray) -> FloatArray:
-    """T_world_camera (4, 4) of a camera that keeps the horizon level."""
-    forward = (target - position) / np.linalg.norm(target - position)
-    right = np.cross(forward, (0.0, 0.0, 1.0))
-    right /= np.linalg.norm(right)
-    return se3.make(np.stack([right, np.cross(forward, right), forward], axis=1), position)
-
-
-AUDIENCE = Camera(_looking_at(np.array([0.2, 0.0, 0.95]), np.array([1.5, -0.9, 1.6])), np.radians(40.0), 5.0)
+AUDIENCE = look_at((1.5, -0.9, 1.6), (0.2, 0.0, 0.95), 40.0)
 
 
 class _Film:
