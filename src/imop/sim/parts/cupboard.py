@@ -4,7 +4,7 @@ from typing import Any
 
 from imop.sim.parts.shapes import WOOD, Color, box, part
 
-HEIGHT, DEPTH = 0.23, 0.29
+HEIGHT, DEPTH = 0.23, 0.33
 """Of the inside, metres, along z and x."""
 PLINTH = 0.10
 """Closed part below."""

@@ -19,7 +19,7 @@ from imop.tasks.waypoint import Waypoint
 from imop.types import FloatArray
 
 _GRASP_DEPTH = 0.02
-_INSIDE = 0.07
+_INSIDE = 0.11
 _FRONT = 0.23
 """How far before the opening the hand turns what it holds: the longest carton is in the air there."""
 _ABOVE_FLOOR = 0.105
@@ -29,7 +29,7 @@ _ROOM = 0.05
 
 def _level(x: float) -> FloatArray:
     """T_cupboard_gripper (4, 4): level, pointing into the cupboard, closing sideways; tip at `x`."""
-    z, x_axis = np.array([-1.0, 0.0, 0.0]), np.array([0.0, 0.0, -1.0])
+    z, x_axis = np.array([-1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
     R = np.stack([x_axis, np.cross(z, x_axis), z], axis=1)
     return se3.make(R, (x, 0.0, _ABOVE_FLOOR))
 
