@@ -51,8 +51,8 @@ def test_a_rope_held_at_one_end_hangs_without_tearing(world):
     world.set_free_pose("rope/body", se3.make(p=tuple(p_tip - (0, 0, 0.003))))
     set_gripper(world, gripper_open=False)
     assert world.held == ("rope/body",)
-    world.step(1000)
+    world.step(4000)
     p = middles(world)
     assert np.linalg.norm(p[0] - p_tip) < 0.01
-    assert p[0, 2] - p[-1, 2] > 0.6 * SHAPE.length
+    assert p[0, 2] - p[-1, 2] > 0.7 * SHAPE.length
     assert np.all(np.linalg.norm(np.diff(p, axis=0), axis=1) < 1.01 * SHAPE.pitch)
