@@ -13,6 +13,9 @@ from imop.types import FloatArray
 Color = Sequence[float]
 """Red, green, blue, 0 .. 1."""
 
+Point = Sequence[float] | FloatArray
+"""x, y, z in metres."""
+
 WOOD, PLASTIC, METAL, PAPER = 500.0, 350.0, 1200.0, 80.0
 """Densities in kg/m3, of solids that stand for partly hollow things."""
 
@@ -62,9 +65,7 @@ def cylinder(
     )
 
 
-def capsule(
-    body: Any, start: Sequence[float], end: Sequence[float], radius: float, color: Color, density: float
-) -> None:
+def capsule(body: Any, start: Point, end: Point, radius: float, color: Color, density: float) -> None:
     """Add a rod with round ends between two points."""
     body.add_geom(
         type=mujoco.mjtGeom.mjGEOM_CAPSULE,

@@ -1,0 +1,87 @@
+"""What a cheap depth camera does to a clean image: a model of a stereo camera such as RealSense's D415."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import ndimage
+
+from imop.geometry import se3
+from imop.types import BoolArray, CameraView, Float32Array, Observation
+
+_FOCAL_TIMES_BASELINE = 0.055 * 450
+"""Metres times pixels; turns disparity (pixels) into depth."""
+
+
+@dataclass(frozen=True)
+class DepthNoise:
+    """How bad the images are; all zeros leave them alone.
+
+    Attributes:
+        disparity: steps in which disparity is measured, pixels.
+        wave: standard deviation of smooth disparity error, pixels.
+        bleed: share of the pixels at depth edges that take their neighbour's depth.
+        holes: share of the pixels lost in patches, and twice that at edges.
+        calibration: standard deviation of the camera's supposed position, metres; in turn, radians, the same.
+        lose_view: probability that one view is missing.
+    """
+
+    disparity: float = 0.0
+    wave: float = 0.0
+    bleed: float = 0.0
+    holes: float = 0.0
+    calibration: float = 0.0
+    lose_view: float = 0.0
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator) -> "DepthNoise":
+        """Clean half of the time, else anything up to a real camera's."""
+        lose = 0.1
+        if rng.random() < 0.5:
+            return cls(lose_view=lose)
+        s = rng.uniform(0.1, 1.0)
+        return cls(0.06 * s, 0.05 * s, 0.5 * s, 0.05 * s, 0.0015 * s, lose)
+
+    def __call__(self, observation: Observation, rng: np.random.Generator) -> Observation:
+        """The observation as such cameras would have given it."""
+        views = dict(observation.views)
+        if len(views) > 2 and rng.random() < self.lose_view:
+            del views[str(rng.choice(sorted(views)))]
+        return replace(observation, views={name: self._worse(v, rng) for name, v in views.items()})
+
+    def _worse(self, view: CameraView, rng: np.random.Generator) -> CameraView:
+        if not (self.disparity or self.wave or self.bleed or self.holes or self.calibration):
+            return view
+        depth = view.depth.copy()
+        edge = _edges(depth)
+        moved = edge & (rng.random(depth.shape) < self.bleed)
+        row, column = np.nonzero(moved)
+        shift = rng.integers(-1, 2, (2, len(row)))
+        height, width = depth.shape
+        depth[row, column] = view.depth[
+            np.clip(row + shift[0], 0, height - 1), np.clip(column + shift[1], 0, width - 1)
+        ]
+        depth = self._measured(depth, rng)
+        lost = ndimage.gaussian_filter(rng.normal(size=depth.shape), 1.5)
+        lost = lost / max(float(lost.std()), 1e-9)
+        threshold = np.quantile(lost, 1 - self.holes) if self.holes else np.inf
+        depth[(lost > threshold) | (edge & (rng.random(depth.shape) < 2 * self.holes))] = 0.0
+        error = rng.normal(0, self.calibration, 6) if self.calibration else np.zeros(6)
+        T = view.T_world_camera @ se3.make(se3.euler(*error[3:]), error[:3])
+        return replace(view, depth=depth, T_world_camera=T)
+
+    def _measured(self, depth: Float32Array, rng: np.random.Generator) -> Float32Array:
+        """Depth after its disparity was disturbed and rounded."""
+        seen = depth > 0
+        disparity = _FOCAL_TIMES_BASELINE / np.where(seen, depth, 1.0)
+        smooth = ndimage.gaussian_filter(rng.normal(size=depth.shape), 2.0)
+        disparity = disparity + self.wave * smooth / max(float(smooth.std()), 1e-9)
+        if self.disparity:
+            disparity = np.round(disparity / self.disparity) * self.disparity
+        worse = _FOCAL_TIMES_BASELINE / np.maximum(disparity, 1e-3)
+        return np.where(seen, worse, 0.0).astype(np.float32)
+
+
+def _edges(depth: Float32Array, gap: float = 0.02) -> BoolArray:
+    """(H, W) True where the depth jumps by more than `gap` metres nearby."""
+    far, near = ndimage.maximum_filter(depth, 3), ndimage.minimum_filter(depth, 3)
+    return np.asarray(far - near > gap)

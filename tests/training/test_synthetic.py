@@ -1,0 +1,105 @@
+import numpy as np
+import pytest
+
+from imop.geometry import se3
+from imop.geometry.neighbours import nearest
+from imop.training.families import TRAINING
+from imop.training.generate import generate
+from imop.training.shards import Shard
+from imop.training.stage import Stage, State
+from imop.training.synthetic import right_motions, synthetic_pairs
+
+
+@pytest.fixture(scope="module")
+def pairs():
+    return list(synthetic_pairs(3, 24, TRAINING))
+
+
+def test_the_truth_carries_the_region_onto_the_observed_surface(pairs):
+    """What the query shows of the region lies where every right motion says, up to noise and hidden sides."""
+    shares = []
+    for pair in pairs:
+        region = pair.support.points[pair.region]
+        for T in pair.T_query_support[:3]:
+            distance, _ = nearest(se3.apply(T, region), pair.query.points)
+            shares.append(float((distance < 0.02).mean()))
+    assert np.median(shares) > 0.7
+    assert np.quantile(shares, 0.05) > 0.2
+
+
+def test_regions_are_parts_of_the_scene(pairs):
+    for pair in pairs:
+        assert 0 < pair.region.sum() < len(pair.region)
+        assert len(pair.T_query_support) >= 1
+
+
+def test_scenes_really_differ(pairs):
+    moved = [se3.translation_distance(pair.T_query_support[0], np.eye(4)) for pair in pairs]
+    assert np.median(moved) > 0.05
+
+
+def test_the_same_seed_gives_the_same_pairs():
+    first, second = (list(synthetic_pairs(5, 4, TRAINING)) for _ in range(2))
+    for a, b in zip(first, second, strict=True):
+        np.testing.assert_array_equal(a.query.points, b.query.points)
+        np.testing.assert_array_equal(a.T_query_support, b.T_query_support)
+
+
+@pytest.mark.parametrize("name", list(TRAINING))
+def test_every_family_makes_a_thing_that_fits_on_the_table(name):
+    rng = np.random.default_rng(0)
+    thing = TRAINING[name](rng, rng)
+    stage = Stage([thing])
+    poses = stage.link_poses(State(np.eye(4)[None]))
+    xy, _ = stage.footprint(0, np.eye(3))
+    assert np.abs(xy).max() < 0.3 and stage.top(0) - stage.bottom(0) < 0.5
+    for hold in (*thing.holds, *thing.pokes, *(m.hold for m in thing.moving)):
+        assert (0, hold.link) in poses
+        assert 0.0 <= hold.width <= 0.08
+    for moving in thing.moving:
+        start, end = (stage.link_in_body(0, moving.joint, p) for p in moving.positions)
+        assert not np.allclose(start, end)
+
+
+@pytest.mark.parametrize("name", list(TRAINING))
+def test_shape_and_colour_are_drawn_apart(name):
+    """The same shape in another colour, and the same thing twice, are what distractors are made of."""
+
+    def solid(shape, color):
+        thing = TRAINING[name](np.random.default_rng(shape), np.random.default_rng(color))
+        model = Stage([thing])._world.model
+        mine = [g for g in range(model.ngeom) if model.body(model.geom_bodyid[g]).name.startswith("thing0")]
+        return model.geom_size[mine], model.geom_rgba[mine]
+
+    (size, paint), (same_size, other_paint), (_, same_paint) = solid(1, 1), solid(1, 2), solid(1, 1)
+    np.testing.assert_array_equal(size, same_size)
+    np.testing.assert_array_equal(paint, same_paint)
+    assert not np.array_equal(paint, other_paint)
+
+
+def test_symmetric_and_equal_things_have_several_right_motions():
+    class TwoCans:
+        def __init__(self):
+            rng = np.random.default_rng
+            self.stage = Stage([TRAINING["can"](rng(1), rng(2)) for _ in range(2)])
+            self.kinds = (0, 0)
+
+    scene = TwoCans()
+    here = [se3.make(p=(0.1, y, 0.8)) for y in (-0.2, 0.2)]
+    there = [se3.make(p=(0.3, y, 0.8)) for y in (-0.1, 0.3)]
+    before, now = (scene.stage.link_poses(State(np.stack(poses))) for poses in (here, there))
+    motions = right_motions(scene, (0, "body"), [(0, "body")], before, now)
+    ends = {tuple(np.round((T @ here[0])[:3, 3], 3)) for T in motions}
+    assert ends == {tuple(T[:3, 3]) for T in there}
+    assert len(motions) == 2 * len(scene.stage.things[0].symmetry) > 2
+
+
+def test_generation_goes_on_where_it_stopped(tmp_path):
+    generate(tmp_path, 3, seed=0, jobs=1)
+    (path,) = tmp_path.iterdir()
+    first = path.read_bytes()
+    generate(tmp_path, 3, seed=0, jobs=1)
+    assert path.read_bytes() == first and len(Shard(path)) == 3
+    path.write_bytes(first[:1000])
+    generate(tmp_path, 3, seed=0, jobs=1)
+    assert len(Shard(path)) == 3
