@@ -3,7 +3,7 @@ import pytest
 
 from imop.geometry import se3
 from imop.geometry.neighbours import nearest
-from imop.training.families import TRAINING
+from imop.training.families import HELD_OUT, TRAINING
 from imop.training.generate import generate
 from imop.training.shards import Shard
 from imop.training.stage import Stage, State
@@ -39,16 +39,19 @@ def test_scenes_really_differ(pairs):
 
 
 def test_the_same_seed_gives_the_same_pairs():
-    first, second = (list(synthetic_pairs(5, 4, TRAINING)) for _ in range(2))
+    first, second = (list(synthetic_pairs(7, 4, TRAINING)) for _ in range(2))
     for a, b in zip(first, second, strict=True):
         np.testing.assert_array_equal(a.query.points, b.query.points)
         np.testing.assert_array_equal(a.T_query_support, b.T_query_support)
 
 
-@pytest.mark.parametrize("name", list(TRAINING))
+EVERY = TRAINING | HELD_OUT
+
+
+@pytest.mark.parametrize("name", list(EVERY))
 def test_every_family_makes_a_thing_that_fits_on_the_table(name):
     rng = np.random.default_rng(0)
-    thing = TRAINING[name](rng, rng)
+    thing = EVERY[name](rng, rng)
     stage = Stage([thing])
     poses = stage.link_poses(State(np.eye(4)[None]))
     xy, _ = stage.footprint(0, np.eye(3))
@@ -61,15 +64,24 @@ def test_every_family_makes_a_thing_that_fits_on_the_table(name):
         assert not np.allclose(start, end)
 
 
-@pytest.mark.parametrize("name", list(TRAINING))
+def test_families_for_testing_only_are_no_training_families():
+    assert not set(HELD_OUT) & set(TRAINING) and not set(HELD_OUT.values()) & set(TRAINING.values())
+    made_by = {family.__module__ for family in TRAINING.values()}
+    assert "imop.training.families.held_out" not in made_by
+
+
+def test_held_out_scenes_have_pairs():
+    assert len(list(synthetic_pairs(1, 4, HELD_OUT))) == 4
+
+
+@pytest.mark.parametrize("name", list(EVERY))
 def test_shape_and_colour_are_drawn_apart(name):
     """The same shape in another colour, and the same thing twice, are what distractors are made of."""
 
     def solid(shape, color):
-        thing = TRAINING[name](np.random.default_rng(shape), np.random.default_rng(color))
-        model = Stage([thing])._world.model
-        mine = [g for g in range(model.ngeom) if model.body(model.geom_bodyid[g]).name.startswith("thing0")]
-        return model.geom_size[mine], model.geom_rgba[mine]
+        thing = EVERY[name](np.random.default_rng(shape), np.random.default_rng(color))
+        model = thing.part.compile()
+        return model.geom_size, model.geom_rgba
 
     (size, paint), (same_size, other_paint), (_, same_paint) = solid(1, 1), solid(1, 2), solid(1, 1)
     np.testing.assert_array_equal(size, same_size)

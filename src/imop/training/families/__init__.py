@@ -1,6 +1,7 @@
-"""Families of procedural things to train on. The novel tasks' kinds of things are not among them."""
+"""Families of procedural things. The novel tasks' kinds of things are apart, for testing only."""
 
 from imop.training.families import cabinets, rings, solids, tools, vessels
+from imop.training.families.held_out import HELD_OUT
 from imop.training.families.thing import Family, Thing
 
 TRAINING: dict[str, Family] = {
@@ -33,4 +34,4 @@ TRAINING: dict[str, Family] = {
 }
 """What the bundled weights learn from."""
 
-__all__ = ["TRAINING", "Family", "Thing"]
+__all__ = ["HELD_OUT", "TRAINING", "Family", "Thing"]
