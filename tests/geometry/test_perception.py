@@ -6,7 +6,7 @@ import pytest
 from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, estimate_normals, fuse
-from imop.geometry.perception import Perception, supporting_plane, thin_plane
+from imop.geometry.perception import Perception, supporting_plane
 from tests.geometry.test_cloud import flat_view, observation
 
 
@@ -24,15 +24,6 @@ def test_finds_the_table_and_not_the_box():
     np.testing.assert_allclose(plane.normal, (0, 0, 1), atol=1e-3)
     assert plane.offset == pytest.approx(0.75, abs=1e-3)
     assert np.ptp(plane.height(cloud.points)) == pytest.approx(0.1, abs=2e-3)
-
-
-def test_the_plane_is_thinned_but_not_deleted():
-    cloud = Perception()(table_with_box())
-    plane = supporting_plane(cloud)
-    thin = thin_plane(cloud, plane, spacing=0.05)
-    box, thin_box = (np.count_nonzero(plane.height(c.points) > 0.05) for c in (cloud, thin))
-    assert box == thin_box
-    assert 0 < len(thin) - thin_box < (len(cloud) - box) / 2
 
 
 def test_a_tilted_camera_does_not_tilt_the_plane(rng):

@@ -70,3 +70,11 @@ def test_a_cloud_of_one_point_makes_a_graph():
     graph = build_graph(cloud, SMALL)
     assert all(len(level.points) == 1 for level in graph.levels)
     assert graph.levels[0].neighbours.tolist() == [[0] * SMALL.neighbours]
+
+
+def test_the_plane_is_thinned_and_not_deleted():
+    cloud = tabletop()
+    fine, height = thin(cloud, SMALL)
+    flat, before = np.count_nonzero(np.abs(height) < 0.008), np.count_nonzero(cloud.points[:, 2] < 0.758)
+    assert 0 < flat <= SMALL.max_points / 3 < before
+    assert np.ptp(fine.points[np.abs(height) < 0.008, :2], axis=0).min() > 0.4

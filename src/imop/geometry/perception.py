@@ -14,6 +14,9 @@ from imop.types import BoolArray, FloatArray, Observation
 WORKSPACE_LOWER = (-0.3, -0.5, 0.6)
 WORKSPACE_UPPER = (0.7, 0.5, 1.6)
 
+# Points nearer than this to the supporting plane belong to it, metres.
+PLANE_THICKNESS = 0.008
+
 # Which of the points (N, 3) belong to the robot, given its joint positions and gripper opening.
 RobotMask = Callable[[FloatArray, FloatArray, float], BoolArray]
 
@@ -102,11 +105,3 @@ def supporting_plane(cloud: PointCloud, tilt: float = 0.2, bin_height: float = 0
     if normal[2] < np.cos(tilt):
         normal = np.array([0.0, 0.0, 1.0])
     return Plane(normal, float(normal @ center))
-
-
-def thin_plane(
-    cloud: PointCloud, plane: Plane, thickness: float = 0.008, spacing: float = 0.02
-) -> PointCloud:
-    """The cloud with the plane's points thinned to `spacing` metres: flat targets lie in it, so it stays."""
-    flat = np.abs(plane.height(cloud.points)) < thickness
-    return clouds.concatenate([cloud.select(~flat), clouds.voxel_downsample(cloud.select(flat), spacing)])

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from imop.geometry.cloud import PointCloud, concatenate, farthest_points, voxel_downsample
-from imop.geometry.perception import supporting_plane
+from imop.geometry.perception import PLANE_THICKNESS, supporting_plane
 from imop.types import FloatArray
 
 # Statistics of the neighbourhood are taken at these radii, metres.
@@ -127,7 +127,7 @@ def thin(cloud: PointCloud, config: GraphConfig) -> tuple[PointCloud, FloatArray
     """At most `max_points` of the cloud, few of them on the plane, and their heights (N,) above it."""
     plane = supporting_plane(cloud)
     height = cloud.points[:, 2] - cloud.points[:, 2].min() if plane is None else plane.height(cloud.points)
-    flat = np.abs(height) < (-1.0 if plane is None else 0.008)
+    flat = np.abs(height) < (-1.0 if plane is None else PLANE_THICKNESS)
     above = voxel_downsample(cloud.select(~flat), config.voxel)
     ground = voxel_downsample(cloud.select(flat), config.plane_voxel)
     # The ground gets at most a third of what there is.

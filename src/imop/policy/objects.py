@@ -9,11 +9,9 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from imop.geometry.cloud import PointCloud
-from imop.geometry.perception import supporting_plane
+from imop.geometry.perception import PLANE_THICKNESS, supporting_plane
 from imop.types import FloatArray
 
-# Points lower than this above the supporting plane belong to it, metres.
-PLANE_THICKNESS = 0.008
 # The images resolve 8 mm at arm's length and less on slanted faces; wider gaps part things, metres.
 GAP = 0.02
 
