@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from imop.geometry.cloud import PointCloud, concatenate, farthest_points, voxel_downsample
+from imop.geometry.neighbours import nearest
 from imop.geometry.perception import PLANE_THICKNESS, supporting_plane
 from imop.types import FloatArray
 
@@ -202,9 +203,9 @@ def collate(graphs: Sequence[Graph]) -> Graph:
 
 def nearest_neighbours(query: FloatArray, points: FloatArray, k: int) -> NDArray[np.int64]:
     """(M, k) indices of the nearest points, nearest first; the last is repeated where there are fewer."""
-    found = cKDTree(points).query(query, k=min(k, len(points)))[1].reshape(len(query), -1)
+    found = nearest(query, points, min(k, len(points)))[1]
     missing = k - found.shape[1]
-    return np.concatenate([found, np.repeat(found[:, -1:], missing, axis=1)], axis=1).astype(np.int64)
+    return np.concatenate([found, np.repeat(found[:, -1:], missing, axis=1)], axis=1)
 
 
 def _level(points: FloatArray, normals: FloatArray, k: int, parent: NDArray[np.int64] | None) -> Level:
