@@ -5,7 +5,7 @@ from itertools import pairwise
 
 from torch import Tensor, nn
 
-from imop.networks.blocks import GraphBlock, GraphBlocks, pool_max, relation
+from imop.networks.blocks import GraphBlock, GraphBlocks, gather, pool_max, relation
 from imop.networks.graph import POINT_FEATURES, Graph, Level
 
 
@@ -32,7 +32,7 @@ class Backbone(nn.Module):
     def __init__(self, config: BackboneConfig):
         super().__init__()
         widths, groups = config.widths, [w // config.group_width for w in config.widths]
-        self.embed = nn.Sequential(nn.Linear(config.inputs, widths[0]), nn.LayerNorm(widths[0]), nn.GELU())
+        self.embed = nn.Sequential(nn.Linear(config.inputs, widths[0]), nn.LayerNorm(widths[0]), nn.SiLU())
         self.down_blocks = nn.ModuleList(
             GraphBlocks(w, g, depth) for w, g, depth in zip(widths, groups, config.depths, strict=True)
         )
@@ -59,7 +59,7 @@ class Backbone(nn.Module):
         for k in reversed(range(len(skips))):
             parent = graph.levels[k].parent
             assert parent is not None
-            merged: Tensor = skips[k] + self.up[k](x)[parent]
+            merged: Tensor = skips[k] + gather(self.up[k](x), parent)
             x = self.up_blocks[k](merged, graph.levels[k].neighbours, relations[k])
         return x
 

@@ -39,10 +39,20 @@ def relation(p_i: Tensor, n_i: Tensor, p_j: Tensor, n_j: Tensor) -> Tensor:
 
 
 class MLP(nn.Sequential):
-    """Linear, GELU, linear."""
+    """Linear, SiLU, linear."""
 
     def __init__(self, inputs: int, hidden: int, outputs: int):
-        super().__init__(nn.Linear(inputs, hidden), nn.GELU(), nn.Linear(hidden, outputs))
+        super().__init__(nn.Linear(inputs, hidden), nn.SiLU(), nn.Linear(hidden, outputs))
+
+
+def exact(x: Tensor) -> torch.autocast:
+    """A context without mixed precision: places and scores need more than eight bits."""
+    return torch.autocast(x.device.type, enabled=False)
+
+
+def gather(x: Tensor, index: Tensor) -> Tensor:
+    """x[index] for x (N, C) and index of any shape; on a CPU four times as fast as indexing."""
+    return x.index_select(0, index.reshape(-1)).view(*index.shape, x.shape[1])
 
 
 class GroupedVectorAttention(nn.Module):
@@ -59,10 +69,11 @@ class GroupedVectorAttention(nn.Module):
         self.query = nn.Sequential(nn.Linear(width, width), nn.LayerNorm(width), nn.ReLU())
         self.key = nn.Sequential(nn.Linear(width, width), nn.LayerNorm(width), nn.ReLU())
         self.value = nn.Linear(width, width)
-        self.position = MLP(RELATION, width, 2 * width)
+        self.position = MLP(RELATION, max(16, width // 4), 2 * width)
         self.weight = MLP(width, groups, groups)
         self.out = nn.Linear(width, width)
-        self.groups = groups
+        spread = torch.eye(groups).repeat_interleave(width // groups, dim=1)
+        self.register_buffer("spread", spread, persistent=False)
 
     def forward(self, x: Tensor, context: Tensor, neighbours: Tensor, relations: Tensor) -> Tensor:
         """Attend from each point to its neighbours.
@@ -76,13 +87,13 @@ class GroupedVectorAttention(nn.Module):
         Returns:
             (M, C).
         """
-        m, k = neighbours.shape
         scale, shift = self.position(relations).chunk(2, dim=-1)
-        key = self.key(context)[neighbours]
+        key = gather(self.key(context), neighbours)
         logits = self.weight((key - self.query(x)[:, None]) * scale + shift)
-        weights = logits.softmax(dim=1)
-        values = (self.value(context)[neighbours] + shift).view(m, k, self.groups, -1)
-        mixed: Tensor = self.out((weights[..., None] * values).sum(dim=1).reshape(m, -1))
+        # A product with 0 and 1 spreads the groups over their channels; broadcasting is far slower.
+        weights = logits.softmax(dim=1) @ self.spread
+        values = gather(self.value(context), neighbours) + shift
+        mixed: Tensor = self.out((weights * values).sum(dim=1))
         return mixed
 
 

@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from imop.geometry.procrustes import weighted_procrustes
 from imop.networks.backbone import Backbone, BackboneConfig, level_relations
-from imop.networks.blocks import MLP, RELATION, UNIT, DenseBlock, GraphBlock, pad, relation
+from imop.networks.blocks import MLP, RELATION, UNIT, DenseBlock, GraphBlock, exact, gather, pad, relation
 from imop.networks.graph import Graph
 
 
@@ -83,7 +83,7 @@ class MatchingNetwork(nn.Module):
         if config.attention == "global":
             self.region_cross = each(DenseBlock, width, config.heads, True)
             self.query_cross = each(DenseBlock, width, config.heads, True)
-            self.near_bias = nn.ModuleList(MLP(3, 16, config.heads) for _ in range(config.layers - 1))
+            self.near_bias = nn.ModuleList(nn.Linear(3, config.heads) for _ in range(config.layers - 1))
         else:
             self.region_cross = each(GraphBlock, width, groups, True)
             self.query_cross = each(GraphBlock, width, groups, True)
@@ -100,7 +100,7 @@ class MatchingNetwork(nn.Module):
         """
         size = support.size
         cloud = support.cloud[region]
-        features = self.backbone(support)[region]
+        features = gather(self.backbone(support), region)
         x, region_present = pad(features, cloud, size)
         p_x, _ = pad(support.points[region], cloud, size)
         n_x, _ = pad(support.levels[0].normals[region], cloud, size)
@@ -126,9 +126,10 @@ class MatchingNetwork(nn.Module):
         return Correspondence(matrices, p_x, p_y, region_present, query_present)
 
     def _match(self, k: int, x: Tensor, y: Tensor, sides: "_Sides") -> Tensor:
-        a, b = self.project[k](x), self.project[k](y)
-        scores = a @ b.mT * (self.log_scale[k].exp() / a.shape[-1] ** 0.5)
-        return dual_softmax(scores, sides.x, sides.y)
+        a, b = self.project[k](x).float(), self.project[k](y).float()
+        with exact(a):
+            scores = a @ b.mT * (self.log_scale[k].exp() / a.shape[-1] ** 0.5)
+            return dual_softmax(scores, sides.x, sides.y)
 
     def _dense(
         self, k: int, x: Tensor, y: Tensor, sides: "_Sides", T: Tensor | None
@@ -192,14 +193,15 @@ def dual_softmax(scores: Tensor, rows: Tensor, columns: Tensor) -> Tensor:
 
 def reposition(matrix: Tensor, p_x: Tensor, p_y: Tensor) -> Tensor:
     """(B, 4, 4) motion of the region, least squares over each point's best match; no gradient."""
-    with torch.no_grad():
-        weight, best = matrix.max(dim=2)
+    with torch.no_grad(), exact(p_x):
+        weight, best = matrix.to(p_x.dtype).max(dim=2)
         matched = torch.gather(p_y, 1, best[..., None].expand(-1, -1, 3))
         return weighted_procrustes(p_x, matched, weight).T_y_x
 
 
 def _moved(T: Tensor, p: Tensor) -> Tensor:
-    return p @ T[:, :3, :3].mT + T[:, None, :3, 3]
+    with exact(p):
+        return p @ T[:, :3, :3].mT + T[:, None, :3, 3]
 
 
 def _masked(bias: Tensor, present: Tensor) -> Tensor:

@@ -118,7 +118,7 @@ def gripper_features(graph: Graph, steps: StepBatch) -> Tensor:
     columns = []
     for T in (steps.T_world_goal, steps.T_world_now):
         R, p = T[graph.cloud, :3, :3], T[graph.cloud, :3, 3]
-        local = ((graph.points - p)[:, None] @ R)[:, 0]
+        local = ((graph.points - p)[:, :, None] * R).sum(dim=1)
         distance = (local.square().sum(1, keepdim=True) + 1e-8).sqrt()
         bounded = local / (0.1 + distance)
         columns += [bounded, distance.log1p(), torch.exp(-distance / 0.03), torch.exp(-distance / 0.12)]

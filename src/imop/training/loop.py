@@ -50,6 +50,7 @@ class TrainConfig:
         validation_pairs: how many of each folder.
         seed: of weights, data and augmentation.
         workers: processes that prepare samples.
+        mixed: whether products within the networks are made in bfloat16; sums and places stay in float32.
     """
 
     out: Path
@@ -66,6 +67,7 @@ class TrainConfig:
     validation_pairs: int = 200
     seed: int = 0
     workers: int = 1
+    mixed: bool = True
 
 
 class PairLoss(nn.Module):
@@ -189,7 +191,8 @@ def _step(
 ) -> dict[str, float]:
     for group in optimizer.param_groups:
         group["lr"] = config.learning_rate * schedule(state.step, config.warm_up, config.steps)
-    parts = module(batch)
+    with torch.autocast(fabric.device.type, torch.bfloat16, enabled=config.mixed):
+        parts = module(batch)
     loss = torch.stack(list(parts.values())).sum()
     optimizer.zero_grad()
     fabric.backward(loss)

@@ -16,8 +16,9 @@ from imop.training.scenes import Scene, demonstrate, draw_scene
 from imop.training.stage import State, Unreachable
 from imop.types import FloatArray
 
-TAKES = 3
-"""How often a scene's recipe is demonstrated; every two takes make pairs."""
+TAKES = 2
+"""How often a scene's recipe is demonstrated; every two takes make pairs. New scenes teach more than new
+takes of old ones."""
 _SAME_PLACE, _SAME_TURN = 0.002, np.radians(1.0)
 _FEWEST_REGION, _FEWEST_QUERY = 12, 10
 
