@@ -40,11 +40,11 @@ SMALL = ModelConfig()
 PAPER = ModelConfig(
     GraphConfig(voxel=0.005, plane_voxel=0.02, max_points=5000, grids=(0.015, 0.03), neighbours=16),
     RegionConfig(
-        BackboneConfig(POINT_FEATURES + GRIPPER_FEATURES, (256, 384, 512), (2, 4, 2), group_width=16),
+        BackboneConfig(POINT_FEATURES + GRIPPER_FEATURES, (256, 384, 512), (2, 4, 4), group_width=16),
         stages=4,
     ),
     MatchingConfig(
-        BackboneConfig(widths=(256, 384, 512), depths=(2, 3, 2), group_width=16),
+        BackboneConfig(widths=(256, 384, 512), depths=(2, 3, 4), group_width=16),
         attention="graph",
         neighbours=16,
         heads=8,
