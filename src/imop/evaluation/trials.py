@@ -1,12 +1,14 @@
 """Which scene a method is tried in, and which demonstration it was shown before."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.oracle import OraclePolicy
 from imop.evaluation.rollout import Policy
 from imop.evaluation.splits import SPLITS, chosen_tasks
 from imop.geometry.perception import Perception
+from imop.networks.model import BUNDLED
 from imop.policy.baselines import ReplayPolicy
 from imop.policy.one_shot import OneShotPolicy
 from imop.policy.registration import RegistrationMatcher
@@ -86,22 +88,27 @@ def suite_trials(
     }
 
 
-def make_policy(method: str, world: World | None = None, min_confidence: float = 0.0) -> Policy:
+def make_policy(
+    method: str, world: World | None = None, min_confidence: float = 0.0, weights: Path = BUNDLED
+) -> Policy:
     """A fresh policy by the name of its method.
 
     Args:
-        method: replay, registration or oracle.
+        method: learned, replay, registration or oracle.
         world: the simulated world, which only the oracle reads.
         min_confidence: of the one-shot policies.
+        weights: folder of the learned policy's weights.
 
     Raises:
         InvalidInput: for an unknown method, or an oracle without a world.
     """
     if method == "replay":
         return ReplayPolicy()
+    perception = Perception(panda_self_filter().is_robot)
     if method == "registration":
-        perception = Perception(panda_self_filter().is_robot)
         return OneShotPolicy(RegistrationMatcher(), perception, min_confidence=min_confidence)
+    if method == "learned":
+        return OneShotPolicy.from_pretrained(weights, perception, min_confidence)
     if method == "oracle" and world is not None:
         return OraclePolicy(world)
-    raise InvalidInput("method", method, "replay, registration, or (in simulation) oracle")
+    raise InvalidInput("method", method, "learned, replay, registration, or (in simulation) oracle")

@@ -30,6 +30,7 @@ class MatchingConfig:
         neighbours: K of the cross graph.
         heads: of the dense attention.
         max_region: points of the region that are matched.
+        region_first: False matches points of the whole support state instead of its region's.
     """
 
     backbone: BackboneConfig = field(default_factory=BackboneConfig)
@@ -38,6 +39,7 @@ class MatchingConfig:
     neighbours: int = 8
     heads: int = 4
     max_region: int = 160
+    region_first: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,17 +92,20 @@ class MatchingNetwork(nn.Module):
         self.project = each(nn.Linear, width, width)
         self.log_scale = nn.Parameter(torch.full((config.layers,), 1.0))
 
-    def forward(self, support: Graph, region: Tensor, query: Graph) -> Correspondence:
+    def forward(
+        self, support: Graph, region: Tensor, query: Graph, described: Tensor | None = None
+    ) -> Correspondence:
         """Match.
 
         Args:
             support: s_i, a batch.
             region: (R,) indices of the region's points in `support`, cloud after cloud, at least one in each.
             query: s_j, as many clouds.
+            described: (M, C) `backbone(support)`, if it was computed before.
         """
         size = support.size
         cloud = support.cloud[region]
-        features = gather(self.backbone(support), region)
+        features = gather(self.backbone(support) if described is None else described, region)
         x, region_present = pad(features, cloud, size)
         p_x, _ = pad(support.points[region], cloud, size)
         n_x, _ = pad(support.levels[0].normals[region], cloud, size)

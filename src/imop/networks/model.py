@@ -17,6 +17,7 @@ from imop.files import replaced
 from imop.networks.backbone import BackboneConfig
 from imop.networks.graph import POINT_FEATURES, GraphConfig
 from imop.networks.matching import MatchingConfig, MatchingNetwork
+from imop.networks.pose import PoseConfig, pose_network
 from imop.networks.region import GRIPPER_FEATURES, RegionConfig, RegionNetwork
 from imop.networks.routing import RoutingConfig, RoutingNetwork
 
@@ -33,6 +34,7 @@ class ModelConfig:
     region: RegionConfig = field(default_factory=RegionConfig)
     matching: MatchingConfig = field(default_factory=MatchingConfig)
     routing: RoutingConfig = field(default_factory=RoutingConfig)
+    pose: PoseConfig = field(default_factory=PoseConfig)
 
 
 SMALL = ModelConfig()
@@ -58,7 +60,7 @@ PAPER = ModelConfig(
 
 
 class Model(nn.Module):
-    """Region, matching and routing networks."""
+    """Region, matching and routing networks, and one for the pose if the configuration wants it."""
 
     def __init__(self, config: ModelConfig):
         super().__init__()
@@ -66,6 +68,7 @@ class Model(nn.Module):
         self.region = RegionNetwork(config.region)
         self.matching = MatchingNetwork(config.matching)
         self.routing = RoutingNetwork(config.routing)
+        self.pose = pose_network(config.pose)
 
     def parameter_table(self) -> dict[str, int]:
         """Number of parameters of each network."""
@@ -92,7 +95,11 @@ def save_model(model: Model, folder: Path, card: Mapping[str, Any]) -> None:
         temporary.write_text(json.dumps({**card, **known}, indent=2) + "\n")
 
 
-def load_model(folder: Path) -> Model:
+BUNDLED = Path(__file__).parents[1] / "weights"
+"""The weights that come with the package: `small`, trained by the command in their card."""
+
+
+def load_model(folder: Path = BUNDLED) -> Model:
     """Read what `save_model` wrote; nothing is unpickled.
 
     Raises:

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from imop.networks.backbone import Backbone, BackboneConfig, level_relations
 from imop.networks.blocks import GraphBlock, relation
-from imop.networks.graph import POINT_FEATURES, Graph
+from imop.networks.graph import POINT_FEATURES, Graph, nearest_neighbours
 
 GRIPPER_FEATURES = 16
 
@@ -59,6 +59,22 @@ class StepBatch:
         """The same batch on a device."""
         rest = (self.T_world_goal, self.T_world_now, self.gripper, self.cross, self.cross_back)
         return StepBatch(self.before.to(device), self.after.to(device), *(t.to(device) for t in rest))
+
+
+def one_step(before: Graph, after: Graph, poses: Tensor, gripper: Tensor, neighbours: int) -> StepBatch:
+    """A batch of one step.
+
+    Args:
+        before: s_i.
+        after: s_i'.
+        poses: (2, 4, 4) T_i and the gripper in s_i, world frame.
+        gripper: (2,) whether it is open in s_i, and after the action.
+        neighbours: K of the cross attention.
+    """
+    p_before, p_after = (g.points.cpu().double().numpy() for g in (before, after))
+    cross = torch.from_numpy(nearest_neighbours(p_before, p_after, neighbours))
+    cross_back = torch.from_numpy(nearest_neighbours(p_after, p_before, neighbours))
+    return StepBatch(before, after, poses[:1], poses[1:], gripper[None], cross, cross_back)
 
 
 class RegionNetwork(nn.Module):

@@ -57,7 +57,7 @@ def find_contacts(steps: Sequence[Transition], objects: Sequence[Objects]) -> Co
         if in_hand:
             event[k] = opens
         else:
-            grasps = not opens and _is_open(step) and distance < GRASP
+            grasps = not opens and is_open(step) and distance < GRASP
             event[k] = grasps or distance < TOUCH
             in_hand = grasps
         if opens:
@@ -65,7 +65,8 @@ def find_contacts(steps: Sequence[Transition], objects: Sequence[Objects]) -> Co
     return Contacts(event, holding, tuple(held))
 
 
-def _is_open(step: Transition) -> bool:
+def is_open(step: Transition) -> bool:
+    """Whether the gripper is open before the step."""
     return step.before.observation.gripper_opening > 0.9
 
 

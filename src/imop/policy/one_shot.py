@@ -1,10 +1,14 @@
 """The policy: watch a demonstration once, then act in scenes that were never seen."""
 
+from pathlib import Path
+
 import numpy as np
 
 from imop.errors import InvalidInput, NoConfidentMatch
 from imop.geometry.perception import Perception
+from imop.networks.model import BUNDLED, load_model
 from imop.policy.hypotheses import confidence
+from imop.policy.learned import LearnedMatcher
 from imop.policy.matcher import Matcher, PreparedStep, Scene, Transition
 from imop.policy.router import AdvancingRouter, Router
 from imop.types import Action, Demonstration, FloatArray, Match, Observation
@@ -35,6 +39,23 @@ class OneShotPolicy:
         self._prepared: list[list[PreparedStep]] = []
         self._cameras: set[str] = set()
         self._hints: list[FloatArray] = []
+
+    @classmethod
+    def from_pretrained(
+        cls, weights: Path = BUNDLED, perception: Perception | None = None, min_confidence: float = 0.0
+    ) -> "OneShotPolicy":
+        """The learned policy.
+
+        Args:
+            weights: folder with weights and card, as `imop train` writes it; by default the bundled ones.
+            perception: makes clouds of observations; by default the robot stays in them.
+            min_confidence: below it `act` raises `NoConfidentMatch`.
+
+        Raises:
+            CorruptData: if the weights are missing, damaged, or do not fit their card.
+        """
+        matcher = LearnedMatcher(load_model(weights))
+        return cls(matcher, perception or Perception(), min_confidence=min_confidence)
 
     def watch(self, demonstration: Demonstration) -> None:
         """Take in a demonstration; a further call adds another one.

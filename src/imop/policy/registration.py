@@ -1,31 +1,19 @@
 """The matcher without learning: descriptors, sampled motions, upright seeds, closest points."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, farthest_points, voxel_downsample
 from imop.geometry.features import fpfh
-from imop.geometry.neighbours import within
-from imop.policy.contacts import SAME
-from imop.policy.evidence import Judge, Surface
-from imop.policy.hypotheses import distinct, mutual_matches, sample_motions
+from imop.policy.hypotheses import mutual_matches, sample_motions
 from imop.policy.matcher import Hypothesis, Scene, Transition
-from imop.policy.objects import connected, find_objects
-from imop.policy.refine import FINEST, Refiner, upright
+from imop.policy.objects import connected
 from imop.policy.region import Region, find_regions
+from imop.policy.search import Search, SearchConfig
 from imop.types import FloatArray
-
-# How many of the refined motions get the finest stage too.
-FINISHED = 4
-# Things do not lean: a motion that tilts by this angle (radians) or more is as unlikely as any other tilt.
-TILTED = 0.17
-# Motions nearer to each other than this, metres and radians, are judged once.
-SAME_MOTION = (0.001, 0.01)
-# Farther off (metres) than this is another place.
-ELSEWHERE = 0.03
 
 
 @dataclass(frozen=True)
@@ -37,10 +25,7 @@ class RegistrationMatcher:
         radius: of a descriptor's neighbourhood, metres.
         color_weight: of colours in the comparison of descriptors.
         turns: upright seeds for every object in the query, spread over a full turn.
-        refined: how many seeds are refined by closest points.
-        turn: share of its score that a hypothesis loses for half a turn off the demonstrated motion.
-        tilt: share that it loses for tilting things by `TILTED` or more.
-        change: share that it loses for another place than the demonstrated motion leads to.
+        search: how the motions are refined and judged.
         seed: of the sampling.
     """
 
@@ -48,10 +33,7 @@ class RegistrationMatcher:
     radius: float = 0.05
     color_weight: float = 0.2
     turns: int = 24
-    refined: int = 12
-    turn: float = 0.03
-    tilt: float = 0.35
-    change: float = 0.12
+    search: SearchConfig = field(default_factory=SearchConfig)
     seed: int = 0
 
     def prepare(self, steps: Sequence[Transition]) -> list["RegisteredStep"]:
@@ -75,12 +57,8 @@ class RegisteredStep:
     def __init__(self, matcher: RegistrationMatcher, step: Transition, region: Region) -> None:
         self._matcher = matcher
         self._region = region
-        self._surface = Surface(region.cloud, step.before.observation.views)
-        self._center = region.cloud.points.mean(axis=0)
-        self._T_world_gripper = step.before.observation.T_world_gripper
+        self._search = Search(matcher.search, step.before, region)
         self._keypoints, self._descriptors = matcher.describe(region.cloud, 800)
-        self._coarse = region.cloud.points[farthest_points(region.cloud.points, 400)]
-        self._fine = region.cloud.points[farthest_points(region.cloud.points, 1500)]
 
     @property
     def region(self) -> FloatArray:
@@ -89,57 +67,11 @@ class RegisteredStep:
 
     def match(self, query: Scene, hints: Sequence[FloatArray] = ()) -> tuple[Hypothesis, ...]:
         """Where the region is in the query, best first; see `PreparedStep.match`."""
-        things = self._without_held(query)
+        things = self._search.things(query)
         if len(things) < 5:
             return ()
-        judge = Judge(self._surface, self._region.weight, Surface(things, query.observation.views))
-        T_repeated = query.observation.T_world_gripper @ se3.invert(self._T_world_gripper)
-        likely = np.stack([*hints, np.eye(4), T_repeated])
         seeds = np.concatenate([self._sampled(things), self._upright(things)])
-        order = np.argsort([-judge.glance(T) for T in seeds], kind="stable")
-        chosen = distinct(seeds[order], self._center, keep=self._matcher.refined)
-        motions = self._refined(things, judge, likely, seeds[order[chosen]])
-        preference = [self._preference(hypothesis, T_repeated, bool(hints)) for hypothesis in motions]
-        best_first = [motions[i] for i in np.argsort(-np.asarray(preference), kind="stable")]
-        different = distinct(np.stack([h.T_query_support for h in best_first]), self._center, len(best_first))
-        return tuple(best_first[i] for i in different)
-
-    def _refined(
-        self, things: PointCloud, judge: Judge, likely: FloatArray, seeds: FloatArray
-    ) -> list[Hypothesis]:
-        """The likely motions as they are, all motions refined, and all of these set upright."""
-        refine = Refiner(things.points)
-        found = [judge.judge(T) for T in likely]
-        found += [judge.judge(refine(self._coarse, T)) for T in [*likely, *seeds]]
-        found.sort(key=lambda hypothesis: -hypothesis.score)
-        # Many seeds end in the same place.
-        motions = np.stack([hypothesis.T_query_support for hypothesis in found])
-        found = [found[i] for i in distinct(motions, self._center, len(found), *SAME_MOTION)]
-        # The last half millimetre is worth looking for only where it matters.
-        finished = [refine(self._fine, h.T_query_support, FINEST) for h in found[:FINISHED]]
-        found += [judge.judge(T) for T in finished]
-        return found + [judge.judge(upright(h.T_query_support, self._center)) for h in found]
-
-    def _preference(self, hypothesis: Hypothesis, T_repeated: FloatArray, begun: bool) -> float:
-        """The score, less for moving otherwise than demonstrated and for tilting what stands on a table.
-
-        Symmetric things have many equal explanations; the one that repeats the demonstrated motion of the
-        gripper from where it is now (`T_repeated`) is the easiest to reach and does not twist what is held.
-        Among equal things, the one that was approached (if the episode has `begun`) stays the aim.
-        """
-        T, cost = hypothesis.T_query_support, self._matcher
-        turn = float(se3.rotation_distance(T, T_repeated)) / np.pi
-        tilt = min(float(np.arccos(np.clip(T[2, 2], -1.0, 1.0))) / TILTED, 1.0)
-        p_moved, p_repeated = se3.apply(np.stack([T, T_repeated]), self._center[None])[:, 0]
-        away = min(float(np.linalg.norm(p_moved - p_repeated)) / ELSEWHERE, 1.0) if begun else 0.0
-        return hypothesis.score * (1 - cost.turn * turn - cost.tilt * tilt - cost.change * away)
-
-    def _without_held(self, query: Scene) -> PointCloud:
-        cloud = find_objects(query.cloud).cloud
-        if not len(self._region.p_gripper_held):
-            return cloud
-        p_held = se3.apply(query.observation.T_world_gripper, self._region.p_gripper_held)
-        return cloud.select(~within(cloud.points, p_held, SAME))
+        return self._search(query, things, seeds, hints)
 
     def _sampled(self, things: PointCloud) -> FloatArray:
         """(H, 4, 4) motions from matched descriptors."""

@@ -1,0 +1,137 @@
+"""The learned matcher: the paper's region and matching networks, then the same judgement as registration.
+
+The region network says once per demonstrated step which points the action is fixed to. The matching network
+says which points of the query they are. The paper fits one motion to all of these matches; where several
+equal things are in view that is the average of several answers, so that here triples of matches that agree
+propose motions, and what the cameras saw decides between them and refines the best.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from imop.geometry import se3
+from imop.geometry.neighbours import nearest, within
+from imop.networks.graph import Graph, build_graph
+from imop.networks.matching import Correspondence, reposition
+from imop.networks.model import Model
+from imop.networks.region import StepBatch, one_step
+from imop.policy.contacts import SAME, find_contacts, is_open
+from imop.policy.hypotheses import sample_motions
+from imop.policy.matcher import Hypothesis, Scene, Transition
+from imop.policy.objects import find_objects
+from imop.policy.region import Region
+from imop.policy.search import Search, SearchConfig
+from imop.types import FloatArray
+
+# A region of fewer points cannot be matched.
+FEWEST = 8
+
+
+@dataclass(frozen=True)
+class LearnedMatcher:
+    """Region and matching networks, no descriptors made by hand.
+
+    Attributes:
+        model: the networks; see `networks.model.load_model`.
+        threshold: least probability of a region point.
+        candidates: query points per region point that may be matched.
+        samples: triples drawn from the matches.
+        search: how the motions are refined and judged.
+        seed: of the sampling.
+    """
+
+    model: Model
+    threshold: float = 0.5
+    candidates: int = 2
+    samples: int = 4000
+    search: SearchConfig = field(default_factory=lambda: SearchConfig(refined=5, finished=2))
+    seed: int = 0
+
+    def prepare(self, steps: Sequence[Transition]) -> list["LearnedStep"]:
+        """Find the regions of a demonstration's steps and describe them."""
+        held = find_contacts(steps, [find_objects(step.before.cloud) for step in steps]).p_gripper_held
+        return [LearnedStep(self, step, p_held) for step, p_held in zip(steps, held, strict=True)]
+
+
+class LearnedStep:
+    """A demonstrated step prepared for the matching network."""
+
+    def __init__(self, matcher: LearnedMatcher, step: Transition, p_gripper_held: FloatArray) -> None:
+        self._matcher = matcher
+        model = matcher.model
+        before, after = (build_graph(scene.cloud, model.config.graph) for scene in (step.before, step.after))
+        with torch.inference_mode():
+            logits = model.region(_batch(step, before, after, model.config.graph.neighbours))[-1]
+            self._described = model.matching.backbone(before)
+        probability = torch.sigmoid(logits)
+        self._graph, self._chosen = before, self._choose(probability)
+        self._probability = probability[self._chosen].double().numpy()
+        self._region = _dense(step, before, probability, self._chosen, p_gripper_held)
+        self._search = Search(matcher.search, step.before, self._region)
+
+    def _choose(self, probability: Tensor) -> Tensor:
+        """(R,) the likeliest points, in order of their index."""
+        count = int((probability > self._matcher.threshold).sum())
+        most = self._matcher.model.config.matching.max_region
+        count = min(max(count, FEWEST), most, len(probability))
+        return probability.topk(count).indices.sort().values
+
+    @property
+    def region(self) -> FloatArray:
+        """(M, 3) points of the region in the demonstrated scene."""
+        return self._region.cloud.points
+
+    def match(self, query: Scene, hints: Sequence[FloatArray] = ()) -> tuple[Hypothesis, ...]:
+        """Where the region is in the query, best first; see `PreparedStep.match`."""
+        if len(query.cloud) < 5:
+            return ()
+        model = self._matcher.model
+        seen = build_graph(query.cloud, model.config.graph)
+        with torch.inference_mode():
+            found = model.matching(self._graph, self._chosen, seen, self._described)
+        seeds = self._seeds(found, seen)
+        things = self._search.things(query)
+        return self._search(query, things, seeds, hints) if len(things) >= 5 else ()
+
+    def _seeds(self, found: Correspondence, seen: Graph) -> FloatArray:
+        """(H, 4, 4): the paper's least squares over all matches, and motions that some matches agree on."""
+        everything = reposition(found.last, found.p_region, found.p_query).double().numpy()
+        weight, best = found.last[0].topk(min(self._matcher.candidates, len(seen.points)), dim=1)
+        w = weight.double().numpy() * self._probability[:, None]
+        i = np.repeat(np.arange(len(w)), w.shape[1])
+        x, n_x = (t[self._chosen].double().numpy()[i] for t in _surface(self._graph))
+        y, n_y = (t[best.flatten()].double().numpy() for t in _surface(seen))
+        sampled = sample_motions(
+            x, y, n_x, n_y, w.flatten() + 1e-6, samples=self._matcher.samples, seed=self._matcher.seed
+        )
+        return np.concatenate([everything, sampled])
+
+
+def _surface(graph: Graph) -> tuple[Tensor, Tensor]:
+    return graph.levels[0].points, graph.levels[0].normals
+
+
+def _batch(step: Transition, before: Graph, after: Graph, neighbours: int) -> StepBatch:
+    observation, action = step.before.observation, step.action
+    poses = np.stack([action.T_world_gripper, observation.T_world_gripper])
+    gripper = torch.tensor([is_open(step), action.gripper_open], dtype=torch.float32)
+    return one_step(before, after, torch.from_numpy(poses.astype(np.float32)), gripper, neighbours)
+
+
+def _dense(
+    step: Transition, graph: Graph, probability: Tensor, chosen: Tensor, p_gripper_held: FloatArray
+) -> Region:
+    """The region on the full cloud: every point belongs as much as the nearest point of the graph does."""
+    cloud = step.before.cloud
+    weight = torch.zeros_like(probability).index_copy(0, chosen, probability[chosen]).double().numpy()
+    owner = nearest(cloud.points, graph.points.double().numpy())[1][:, 0]
+    member = weight[owner] > 0
+    region = cloud.select(member)
+    p_held = se3.apply(step.before.observation.T_world_gripper, p_gripper_held)
+    if len(p_held) and within(p_held, region.points, SAME).mean() > 0.5:
+        p_gripper_held = p_gripper_held[:0]
+    return Region(region, weight[owner[member]], p_gripper_held)
