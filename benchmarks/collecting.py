@@ -48,7 +48,7 @@ def timed(key: Key) -> tuple[float, float, float]:
     """Wall seconds, CPU seconds and failed attempts of one episode."""
     wall, cpu = time.perf_counter(), time.process_time()
     episode = record(key)
-    failed = (episode.seeds["episode"] - key[2]) // RETRY_STRIDE if episode else np.nan
+    failed = episode.seeds["episode"] // RETRY_STRIDE if episode else np.nan
     return time.perf_counter() - wall, time.process_time() - cpu, failed
 
 
@@ -57,7 +57,7 @@ def main() -> int:
     console = Console()
     tasks = chosen_tasks(options.suite, options.split)
     keys = [
-        (task, i % make_task(task).variations, COLLECTION_SEED + i)
+        (task, i % make_task(task).variations, COLLECTION_SEED + i, COLLECTION_SEED + i)
         for task in tasks
         for i in range(options.episodes)
     ]

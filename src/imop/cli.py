@@ -74,6 +74,8 @@ def collect(
     seed: int = 0,
     jobs: int = 2,
     cluster: str | None = None,
+    scenes: int = 1,
+    in_turn: bool = False,
 ) -> int:
     """Record demonstrations by the expert into a store, every task and variation.
 
@@ -86,15 +88,18 @@ def collect(
         suite: which suite.
         split: which of its tasks.
         tasks: names within the split; all if none is given.
-        episodes: demonstrations per task and variation, each with its own objects and scene.
+        episodes: demonstrations per task and variation, each in its own scene.
         seed: number of the first episode; other numbers give other objects and scenes.
         jobs: parallel processes on this machine.
         cluster: address of a Ray cluster to work on instead, such as auto or 10.0.0.1:6379.
+        scenes: how many demonstrations in a row have the same objects; regions are found with two or more.
+        in_turn: count episodes per task, not per variation; sets of objects have the variations in turn.
     """
     from imop.evaluation.collect import collect as collect_into
     from imop.evaluation.splits import chosen_tasks
 
-    done = collect_into(out, chosen_tasks(suite, split, tasks), episodes, seed, jobs, console, cluster)
+    names = chosen_tasks(suite, split, tasks)
+    done = collect_into(out, names, episodes, seed, jobs, console, cluster, scenes, in_turn)
     total, failed = sum(done.episodes.values()), sum(done.failed_attempts.values())
     console.print(f"{total} demonstrations in {out}, {done.recorded} of them new in {done.seconds:.0f} s")
     console.print(f"{failed} expert attempts failed and were repeated with another seed")

@@ -68,7 +68,18 @@ def test_a_finished_store_is_left_alone_and_a_larger_one_is_extended(store, monk
     monkeypatch.setattr(module, "record", lambda key: asked.append(key))
     assert collect(store, [POT], EPISODES, 0, 1, QUIET).recorded == 0 and not asked
     done = collect(store, [POT], EPISODES + 1, 0, 1, QUIET)
-    assert asked == [(POT, 0, COLLECTION_SEED + EPISODES)] and len(done.given_up) == 1
+    next_one = COLLECTION_SEED + EPISODES
+    assert asked == [(POT, 0, next_one, next_one)] and len(done.given_up) == 1
+
+
+def test_scenes_in_a_row_share_their_objects_and_variations_come_in_turn(monkeypatch, tmp_path):
+    asked = []
+    monkeypatch.setattr(module, "record", lambda key: asked.append(key))
+    drawer, first = "tabletop/open_drawer", COLLECTION_SEED + 5
+    collect(tmp_path / "demos.zarr", [drawer], 7, 5, 1, QUIET, scenes=2, in_turn=True)
+    assert [variation for _, variation, _, _ in asked] == [0, 0, 1, 1, 2, 2, 0]
+    assert [instance - first for _, _, instance, _ in asked] == [0, 0, 1, 1, 2, 2, 3]
+    assert [scene - first for _, _, _, scene in asked] == list(range(7))
 
 
 def test_a_failed_attempt_is_repeated_in_another_scene_and_counted(monkeypatch, tmp_path):
@@ -83,7 +94,8 @@ def test_a_failed_attempt_is_repeated_in_another_scene_and_counted(monkeypatch, 
     done = collect(tmp_path / "demos.zarr", [POT], 1, 7, 1, QUIET)
     assert done.failed_attempts == {POT: 1} and not done.given_up
     seeds = recorded_seeds(DemonstrationStore.open(tmp_path / "demos.zarr"))
-    assert seeds == {(POT, 0, COLLECTION_SEED + 7): COLLECTION_SEED + 7 + RETRY_STRIDE}
+    first = COLLECTION_SEED + 7
+    assert seeds == {(POT, 0, first, first): first + RETRY_STRIDE}
     assert json.loads((tmp_path / "demos.json").read_text())["failed_attempts"] == {POT: 1}
 
 

@@ -34,8 +34,8 @@ ATTEMPTS = 10
 _BATCH = 4
 """Episodes per worker of a cluster between two writes to the store."""
 
-Key = tuple[str, int, int]
-"""Task, variation, and seed of the objects: what an episode is."""
+Key = tuple[str, int, int, int]
+"""Task, variation, seed of the objects and of the scene in the first attempt: what an episode is."""
 
 
 @dataclass(frozen=True)
@@ -74,10 +74,12 @@ def collect(
     jobs: int,
     console: Console,
     cluster: str | None = None,
+    scenes: int = 1,
+    in_turn: bool = False,
 ) -> Collected:
     """Record `episodes` demonstrations of every variation of every task, but for those in the store already.
 
-    Every episode has its own objects and scene. Writes a report beside the store, NAME.json for NAME.zarr.
+    Every episode has its own scene. Writes a report beside the store, NAME.json for NAME.zarr.
 
     Args:
         out: folder of the store; made if it does not exist.
@@ -87,20 +89,19 @@ def collect(
         jobs: parallel processes; ignored with a cluster, which is used whole.
         console: where progress is shown.
         cluster: address of a Ray cluster on which imop is installed, or None for this machine.
+        scenes: how many episodes in a row have the same objects.
+        in_turn: `episodes` counts per task, and the sets of objects have its variations in turn.
 
     Raises:
-        InvalidInput: for an unknown task, no episodes or a negative seed.
+        InvalidInput: for an unknown task, no episodes, no scenes or a negative seed.
         MissingExtra: if there is a cluster but Ray is not installed.
     """
     if episodes < 1 or not 0 <= seed <= RETRY_STRIDE - COLLECTION_SEED - episodes:
         problem = f"{episodes} episodes from number {seed}"
         raise InvalidInput("episodes, seed", problem, "at least one episode, numbers from 0 to 8 million")
-    wanted = [
-        (task, variation, COLLECTION_SEED + seed + i)
-        for task in tasks
-        for variation in range(make_task(task).variations)
-        for i in range(episodes)
-    ]
+    if scenes < 1:
+        raise InvalidInput("scenes", f"{scenes}", "at least one scene for the same objects")
+    wanted = [key for task in tasks for key in _keys(task, episodes, COLLECTION_SEED + seed, scenes, in_turn)]
     started = time.monotonic()
     store = DemonstrationStore.open(out) if _is_store(out) else DemonstrationStore.create(out)
     present = recorded_seeds(store)
@@ -110,14 +111,14 @@ def collect(
         results = _results(missing, jobs, cluster is not None)
         for key, demonstration in zip(missing, _shown(results, len(missing), console), strict=True):
             if demonstration is None:
-                given_up.append(f"{key[0]}, variation {key[1]}, objects {key[2]}")
+                given_up.append(f"{key[0]}, variation {key[1]}, objects {key[2]}, scene {key[3]}")
             else:
                 store.append(demonstration)
     present = recorded_seeds(store)
     found = [key for key in wanted if key in present]
     attempts = Counter({task: 0 for task in tasks})
     for key in found:
-        attempts[key[0]] += (present[key] - key[2]) // RETRY_STRIDE
+        attempts[key[0]] += present[key] // RETRY_STRIDE
     counts = Counter(key[0] for key in found)
     collected = Collected(
         dict(counts),
@@ -130,24 +131,31 @@ def collect(
     return collected
 
 
+def _keys(task: str, episodes: int, first: int, scenes: int, in_turn: bool) -> list[Key]:
+    count = make_task(task).variations
+    numbers = [(first + i // scenes, first + i) for i in range(episodes)]
+    if in_turn:
+        return [(task, (instance - first) % count, instance, scene) for instance, scene in numbers]
+    return [(task, variation, *number) for variation in range(count) for number in numbers]
+
+
 def recorded_seeds(store: DemonstrationStore) -> dict[Key, int]:
-    """Task, variation and object seed of every simulated episode of a local store -> seed of its scene."""
+    """What every simulated episode of a local store is -> seed of the scene of the successful attempt."""
     seeds = {}
     for file in sorted(Path(store.path).glob("episode_*/zarr.json")):
         a = json.loads(file.read_text())["attributes"]
         if {"instance", "episode"} <= a["seeds"].keys():
-            seeds[a["task"], a["variation"], a["seeds"]["instance"]] = a["seeds"]["episode"]
+            scene = a["seeds"]["episode"]
+            seeds[a["task"], a["variation"], a["seeds"]["instance"], scene % RETRY_STRIDE] = scene
     return seeds
 
 
 def record(key: Key) -> Demonstration | None:
     """One episode; None if the expert fails in `ATTEMPTS` scenes with these objects."""
-    task, variation, instance = key
+    task, variation, instance, scene = key
     for attempt in range(ATTEMPTS):
         try:
-            return record_demonstration(
-                make_task(task), instance + attempt * RETRY_STRIDE, variation, instance
-            )
+            return record_demonstration(make_task(task), scene + attempt * RETRY_STRIDE, variation, instance)
         except (ExpertFailed, NoRoom):
             continue
     return None
