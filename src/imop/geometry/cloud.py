@@ -133,11 +133,7 @@ def voxel_downsample(cloud: PointCloud, size: float) -> PointCloud:
     """
     if not size > 0:
         raise InvalidInput("size", f"{size}", "a positive edge length in metres")
-    cells = np.floor(cloud.points / size).astype(np.int64)
-    _, first, cell, counts = np.unique(
-        cells, axis=0, return_index=True, return_inverse=True, return_counts=True
-    )
-    cell = cell.reshape(-1)
+    first, cell, counts = grid_cells(np.floor(cloud.points / size).astype(np.int64))
 
     def mean(values: NDArray[np.floating]) -> FloatArray:
         columns = [np.bincount(cell, weights=column, minlength=len(counts)) for column in values.T]
@@ -154,6 +150,27 @@ def voxel_downsample(cloud: PointCloud, size: float) -> PointCloud:
         normals,
         None if cloud.ids is None else cloud.ids[first],
     )
+
+
+def grid_cells(cells: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Which points share a cell of a grid.
+
+    Args:
+        cells: (N, 3) integer coordinates.
+
+    Returns:
+        (C,) index of the first point of each occupied cell, (N,) number of each point's cell, (C,) number of
+        points in each cell; cells in lexicographic order.
+    """
+    if not len(cells):
+        nothing = np.zeros(0, dtype=np.int64)
+        return nothing, nothing, nothing
+    low = cells.min(axis=0)
+    shape = cells.max(axis=0) - low + 1
+    # One number per cell sorts several times as fast as rows; a cloud of metres at millimetres fits easily.
+    flat = ((cells[:, 0] - low[0]) * shape[1] + cells[:, 1] - low[1]) * shape[2] + cells[:, 2] - low[2]
+    _, first, cell, counts = np.unique(flat, return_index=True, return_inverse=True, return_counts=True)
+    return first, cell.reshape(-1), counts
 
 
 def farthest_points(points: FloatArray, count: int) -> NDArray[np.int64]:

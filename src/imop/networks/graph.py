@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from torch import Tensor
 
-from imop.geometry.cloud import PointCloud, concatenate, farthest_points, voxel_downsample
+from imop.geometry.cloud import PointCloud, concatenate, farthest_points, grid_cells, voxel_downsample
 from imop.geometry.neighbours import nearest
 from imop.geometry.perception import PLANE_THICKNESS, supporting_plane
 from imop.types import FloatArray
@@ -223,8 +223,7 @@ def _pool(
 ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
     """Cell of each point, and the cells' mean points and normals; the grid begins at the lowest corner."""
     cells = np.floor((points - points.min(axis=0)) / grid).astype(np.int64)
-    _, parent, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
-    parent = parent.reshape(-1).astype(np.int64)
+    _, parent, counts = grid_cells(cells)
 
     def mean(values: FloatArray) -> FloatArray:
         return (
