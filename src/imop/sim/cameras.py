@@ -167,10 +167,10 @@ def look_at(
     return Camera(se3.make(R, eye), float(np.radians(fov_degrees)), 10.0)
 
 
-def observe(world: World, time_step: int = 0) -> Observation:
-    """What the robot sees and feels now, with instance ids for training."""
+def observe(world: World, time_step: int = 0, size: int = 128) -> Observation:
+    """What the robot sees (images of `size` x `size`) and feels now, with instance ids for training."""
     return Observation(
-        views=render(world),
+        views=render(world, size),
         T_world_gripper=world.T_world_gripper,
         gripper_opening=world.gripper_opening,
         time_step=time_step,

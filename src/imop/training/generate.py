@@ -1,4 +1,4 @@
-"""`python -m imop.training.generate`: write shards of synthetic pairs; run again, it goes on."""
+"""`python -m imop.training.generate`: write shards of synthetic pairs or routes; run again, it goes on."""
 
 import argparse
 from pathlib import Path
@@ -8,43 +8,54 @@ from joblib import Parallel, delayed
 
 from imop.errors import CorruptData
 from imop.training.families import HELD_OUT, TRAINING
+from imop.training.route_shards import RouteShard, write_routes
+from imop.training.routes import synthetic_routes
 from imop.training.shards import Shard, write_shard
 from imop.training.synthetic import synthetic_pairs
 
 SHARD = 500
+ROUTE_SHARD = 100
 
 
-def generate(out: Path, pairs: int, seed: int, jobs: int, held_out: bool = False) -> None:
-    """Write `pairs` pairs to numbered shards in `out`; whole shards that are there stay.
+def generate(
+    out: Path, count: int, seed: int, jobs: int, held_out: bool = False, routes: bool = False
+) -> None:
+    """Write `count` pairs, or routes, to numbered shards in `out`; whole shards that are there stay.
 
     Args:
         out: folder.
-        pairs: how many.
+        count: how many.
         seed: with the shard's number and size it determines the content.
         jobs: worker processes.
         held_out: whether of the families for testing only.
+        routes: whether examples for the routing network instead of pairs.
     """
     out.mkdir(parents=True, exist_ok=True)
-    sizes = [min(SHARD, pairs - start) for start in range(0, pairs, SHARD)]
+    full = ROUTE_SHARD if routes else SHARD
+    sizes = [min(full, count - start) for start in range(0, count, full)]
     Parallel(n_jobs=jobs)(
-        delayed(_shard)(out / f"shard-{i:05d}.npz", i, size, seed, held_out) for i, size in enumerate(sizes)
+        delayed(_shard)(out / f"shard-{i:05d}.npz", i, size, seed, held_out, routes)
+        for i, size in enumerate(sizes)
     )
 
 
-def _shard(path: Path, number: int, size: int, seed: int, held_out: bool) -> None:
-    if _whole(path, size):
+def _shard(path: Path, number: int, size: int, seed: int, held_out: bool, routes: bool) -> None:
+    if _whole(path, size, routes):
         return
     content = int(np.random.SeedSequence([seed, number, int(held_out)]).generate_state(1)[0])
     families = HELD_OUT if held_out else TRAINING
-    write_shard(list(synthetic_pairs(content, size, families)), path)
-    print(f"{path}: {size} pairs", flush=True)
+    if routes:
+        write_routes(list(synthetic_routes(content, size, families)), path)
+    else:
+        write_shard(list(synthetic_pairs(content, size, families)), path)
+    print(f"{path}: {size} {'routes' if routes else 'pairs'}", flush=True)
 
 
-def _whole(path: Path, size: int) -> bool:
+def _whole(path: Path, size: int, routes: bool) -> bool:
     if not path.exists():
         return False
     try:
-        return len(Shard(path)) == size
+        return len(RouteShard(path) if routes else Shard(path)) == size
     except CorruptData:
         return False
 
@@ -53,12 +64,16 @@ def main() -> None:
     """Parse the command line."""
     parser = argparse.ArgumentParser(prog="python -m imop.training.generate", description=__doc__)
     parser.add_argument("--out", type=Path, required=True, help="folder of the shards")
-    parser.add_argument("--pairs", type=int, required=True)
+    kind = parser.add_mutually_exclusive_group(required=True)
+    kind.add_argument("--pairs", type=int, help="number of pairs, for the region and matching networks")
+    kind.add_argument("--routes", type=int, help="number of routes, for the routing network")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--held-out", action="store_true", help="families for testing only")
     args = parser.parse_args()
-    generate(args.out, args.pairs, args.seed, args.jobs, args.held_out)
+    routes = args.routes is not None
+    count = args.routes if routes else args.pairs
+    generate(args.out, count, args.seed, args.jobs, args.held_out, routes)
 
 
 if __name__ == "__main__":

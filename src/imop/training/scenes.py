@@ -77,15 +77,17 @@ class _Cast:
             self.add(name, shape, color)
 
 
-def draw_scene(families: Mapping[str, Family], rng: np.random.Generator) -> Scene:
-    """A scene with one or two things to do.
+def draw_scene(
+    families: Mapping[str, Family], rng: np.random.Generator, parts_odds: tuple[float, ...] = (0.65, 0.35)
+) -> Scene:
+    """A scene with one thing to do, or two, or as many as `parts_odds` has chances for.
 
     Raises:
         Unreachable: if no family can play a part that was drawn.
     """
     cast = _Cast(families, rng)
     parts: list[tuple[str, int, int, int]] = []
-    for _ in range(int(rng.choice((1, 2), p=(0.65, 0.35)))):
+    for _ in range(int(rng.choice(1 + np.arange(len(parts_odds)), p=parts_odds))):
         kind = str(rng.choice(("carry", "use", "operate", "press", "push"), p=(0.45, 0.12, 0.27, 0.06, 0.1)))
         if kind == "carry":
             below = cast.where("spots") if rng.random() < 0.15 else -1
@@ -96,12 +98,13 @@ def draw_scene(families: Mapping[str, Family], rng: np.random.Generator) -> Scen
             parts.append((kind, cast.where("moving"), -1, -1))
         else:
             parts.append((kind, cast.where("holds"), -1, -1))
-    for number in range(len(cast.things)):
+    acting = len(cast.things)
+    for number in range(acting):
         cast.distract(number)
     for _ in range(int(rng.integers(1, 4))):
         cast.add()
     for items in (cast.things, cast.kinds):
-        del items[max(MOST_THINGS, 3) :]
+        del items[max(MOST_THINGS, acting) :]
     stage = Stage(cast.things)
     recipes = [_recipe(stage, part, rng) for part in parts]
     recipe = recipes[0]
@@ -179,7 +182,7 @@ def _place(stage: Stage, thing: int, R: FloatArray, free: BoolArray, rng: np.ran
         turned = se3.euler(z=yaw) @ R
         xy, depth = stage.footprint(thing, turned)
         at = np.array([rng.uniform(*side) for side in _AREA])
-        cells = np.unique(np.floor((xy + at - _LOWER) / _CELL).astype(int), axis=0)
+        cells = np.floor((xy + at - _LOWER) / _CELL).astype(int)
         if (cells < 1).any() or (cells >= np.array(free.shape) - 1).any():
             continue
         if free[cells[:, 0], cells[:, 1]].all():

@@ -156,15 +156,24 @@ class Stage:
             for link in links
         }
 
-    def observe(self, state: State, noise: DepthNoise, rng: np.random.Generator) -> Observation:
-        """What the cameras see, with the noise of real ones."""
+    def observe(
+        self, state: State, noise: DepthNoise, rng: np.random.Generator, size: int = 128
+    ) -> Observation:
+        """What the cameras see in `size` x `size` pixels, with the noise of real ones."""
         self.pose(state)
-        return noise(observe(self._world), rng)
+        return noise(observe(self._world, size=size), rng)
 
-    def cloud(self, state: State, noise: DepthNoise, rng: np.random.Generator) -> PointCloud:
-        """The cloud of a state as training stores it, with instance ids."""
-        observation = self.observe(state, noise, rng)
-        return thin(self._perception(observation), STORED)[0]
+    def cloud(
+        self,
+        state: State,
+        noise: DepthNoise,
+        rng: np.random.Generator,
+        stored: GraphConfig = STORED,
+        size: int = 128,
+    ) -> PointCloud:
+        """The cloud of a state as training stores it, with instance ids, from images of `size` x `size`."""
+        observation = self.observe(state, noise, rng, size)
+        return thin(self._perception(observation), stored)[0]
 
 
 def above_table(R: FloatArray, x: float, y: float, depth: float) -> FloatArray:

@@ -53,12 +53,14 @@ class Recipe:
         rests: thing -> rotation (3, 3) in which it lies.
         joints: (thing, joint) -> position.
         resting_on: thing -> (thing below, T_below_thing), for what does not stand on the table.
+        starts: numbers of the steps with which something new begins, whatever the gripper did before.
     """
 
     steps: tuple[Step, ...]
     rests: dict[int, FloatArray]
     joints: dict[tuple[int, str], float]
     resting_on: dict[int, tuple[int, FloatArray]]
+    starts: tuple[int, ...] = (0,)
 
     def then(self, other: "Recipe") -> "Recipe":
         """Both, one after the other."""
@@ -67,6 +69,7 @@ class Recipe:
             other.rests | self.rests,
             other.joints | self.joints,
             other.resting_on | self.resting_on,
+            self.starts + tuple(len(self.steps) + start for start in other.starts),
         )
 
 

@@ -1,0 +1,63 @@
+"""Routes in files, like pairs: a cloud is stored once, whether it is demonstrated, asked about, or both."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imop.training.routes import Query, Route, Seen
+from imop.training.shards import cloud_arrays, read_arrays, read_cloud, starts, write_arrays
+
+VERSION = 1
+
+
+def write_routes(routes: Sequence[Route], path: Path) -> None:
+    """Write routes as one compressed .npz file, whole or not at all."""
+    every = {id(s): s for r in routes for s in (*r.states, *(query.seen for query in r.queries))}
+    number = {key: i for i, key in enumerate(every)}
+    queries = [query for route in routes for query in route.queries]
+    arrays: dict[str, NDArray[Any]] = {
+        "version": np.array(VERSION),
+        **cloud_arrays([seen.cloud for seen in every.values()]),
+        "gripper": np.stack([seen.T_world_gripper for seen in every.values()]),
+        "opening": np.array([seen.opening for seen in every.values()]),
+        "states": np.array([number[id(seen)] for route in routes for seen in route.states]),
+        "state_start": starts([len(route.states) for route in routes]),
+        "queries": np.array([number[id(query.seen)] for query in queries]),
+        "query_start": starts([len(route.queries) for route in routes]),
+        "expected": np.array([query.expected for query in queries]),
+        "right": np.concatenate([query.right for query in queries]),
+        "right_start": starts([len(query.right) for query in queries]),
+    }
+    write_arrays(arrays, path)
+
+
+class RouteShard:
+    """The routes of one file, read into memory.
+
+    Raises:
+        CorruptData: if the file is not a whole shard of routes of this version.
+    """
+
+    def __init__(self, path: Path):
+        self._arrays = read_arrays(path, VERSION, "state_start")
+
+    def __len__(self) -> int:
+        return len(self._arrays["state_start"]) - 1
+
+    def __getitem__(self, index: int) -> Route:
+        a = self._arrays
+        states = a["states"][slice(*a["state_start"][index : index + 2])]
+        queries = range(*a["query_start"][index : index + 2])
+        return Route(tuple(self._seen(int(i)) for i in states), tuple(self._query(i) for i in queries))
+
+    def _query(self, number: int) -> Query:
+        a = self._arrays
+        right = a["right"][slice(*a["right_start"][number : number + 2])]
+        return Query(self._seen(int(a["queries"][number])), int(a["expected"][number]), right)
+
+    def _seen(self, number: int) -> Seen:
+        a = self._arrays
+        return Seen(read_cloud(a, number), a["gripper"][number], float(a["opening"][number]))
