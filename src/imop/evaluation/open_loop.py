@@ -1,11 +1,34 @@
-"""Prediction on recorded data: what would the policy have done in each recorded state?"""
+"""Prediction on recorded data: what would the policy have done in each recorded state?
+
+`predict` lets the policy choose the step itself. `ask` tells it the step, so that finding the right pose and
+choosing the right step are measured apart; which poses are right is said in `equal_poses`.
+"""
 
 import time
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from imop.errors import NoConfidentMatch
+from imop.evaluation.appearance import Appearance
+from imop.evaluation.equal_poses import equal_poses, errors
+from imop.evaluation.open_loop_rows import Row
+from imop.evaluation.oracle import OraclePolicy
 from imop.evaluation.rollout import Policy
+from imop.geometry import cloud as clouds
 from imop.geometry import se3
-from imop.types import Action, Demonstration
+from imop.geometry.neighbours import nearest, within
+from imop.geometry.perception import WORKSPACE_LOWER, WORKSPACE_UPPER
+from imop.policy.matcher import Scene, Transition
+from imop.policy.one_shot import OneShotPolicy
+from imop.policy.router import Router
+from imop.types import Action, Demonstration, FloatArray, Keyframe, Observation
+
+THINNED = 0.005
+"""Metres between the points that regions are compared on."""
+COVERED = 0.01
+"""A point of the object is in the region if the region has a point this near, metres."""
 
 
 @dataclass(frozen=True)
@@ -54,3 +77,179 @@ def predict(policy: Policy, recorded: Demonstration) -> list[Prediction]:
             )
         )
     return predictions
+
+
+class ToldRouter:
+    """Chooses the step it was told and notes what another router would have chosen.
+
+    Attributes:
+        step: what it was told.
+        chosen: what the other router chose last.
+    """
+
+    def __init__(self, router: Router) -> None:
+        self._router = router
+        self.step = 0
+        self.chosen: int | None = None
+
+    def watch(self, steps: Sequence[Transition]) -> None:
+        """The other router takes note."""
+        self._router.watch(steps)
+
+    def reset(self) -> None:
+        """A new episode begins."""
+        self._router.reset()
+
+    def route(self, query: Scene) -> tuple[int, int]:
+        """The step it was told, of the first demonstration."""
+        self.chosen = self._router.route(query)[1]
+        return 0, self.step
+
+    def took(self, demonstration: int, step: int) -> None:
+        """Nothing: the recording goes on whether or not the step was found; see `go_on`."""
+
+    def go_on(self) -> None:
+        """The step it was told has been performed."""
+        self._router.took(0, self.step)
+
+
+class RecordedPoses:
+    """What the oracle asks for, at a recorded keyframe instead of in a simulator."""
+
+    def __init__(self) -> None:
+        self.keyframe: Keyframe | None = None
+
+    def pose(self, body: str) -> FloatArray:
+        """T_world_body (4, 4) at the keyframe, which has to be fixed to this body."""
+        assert self.keyframe is not None and self.keyframe.T_world_object is not None
+        assert self.keyframe.object_name == body
+        return self.keyframe.T_world_object
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A demonstration and the recorded scenes that are asked for after it.
+
+    Attributes:
+        task: its name in the report.
+        support: name of the demonstration in the report.
+        demonstration: with privileged names and poses, if there are any.
+        queries: recordings of the same task, variation and objects by their names in the report.
+        appearance: of the objects; None if it is unknown, then only recorded poses are right.
+    """
+
+    task: str
+    support: str
+    demonstration: Demonstration
+    queries: dict[str, Demonstration]
+    appearance: Appearance | None = None
+
+
+OnRow = Callable[[Row, Case, Action | None], None]
+
+
+def ask(
+    method: str, make: Callable[[RecordedPoses], Policy], case: Case, on_row: OnRow | None = None
+) -> Iterator[Row]:
+    """Show the demonstration to a fresh policy and ask it for the same step at each keyframe of each query.
+
+    Args:
+        method: name in the rows.
+        make: makes the policy; is given the poses that an oracle may read.
+        case: what is shown and asked.
+        on_row: called with every row and the action behind it.
+
+    Raises:
+        ImopError: as the policy does, but for `NoConfidentMatch`, which makes a row without a prediction.
+    """
+    poses = RecordedPoses()
+    policy = make(poses)
+    told = None
+    if isinstance(policy, OneShotPolicy):
+        told = policy.router = ToldRouter(policy.router)
+    shown = case.demonstration
+    policy.watch(shown if isinstance(policy, OraclePolicy) else shown.stripped())
+    overlaps: dict[int, float | None] = {}
+    for query, recorded in case.queries.items():
+        policy.reset()
+        for step in range(min(len(shown), len(recorded))):
+            poses.keyframe = recorded.keyframes[step]
+            action, row = _answer(method, policy, told, case, query, step)
+            if action and action.match and step not in overlaps:
+                overlaps[step] = _overlap(case, step, action.match.region)
+            row = replace(row, region_iou=overlaps.get(step))
+            if on_row:
+                on_row(row, case, action)
+            yield row
+
+
+def _answer(
+    method: str, policy: Policy, told: ToldRouter | None, case: Case, query: str, step: int
+) -> tuple[Action | None, Row]:
+    """What the policy answers, and the row that follows from it."""
+    recorded = case.queries[query]
+    keyframe = recorded.keyframes[step]
+    observation = keyframe.observation.stripped()
+    if told:
+        told.step = step
+    row = Row(method, case.task, recorded.variation, case.support, query, step, keyframe.object_name)
+    action = None
+    started = time.perf_counter()
+    try:
+        action = policy.act(observation)
+    except NoConfidentMatch as error:
+        row = replace(row, problem=str(error))
+    row = replace(row, milliseconds=1000 * (time.perf_counter() - started))
+    if told:
+        told.go_on()
+        row = replace(row, routed=told.chosen)
+    return action, _compared(row, action, recorded, case.appearance) if action else row
+
+
+def _compared(row: Row, action: Action, recorded: Demonstration, appearance: Appearance | None) -> Row:
+    right = equal_poses(recorded, row.step, appearance)
+    position, rotation = errors(action.T_world_gripper, right)
+    plain_position, plain_rotation = errors(action.T_world_gripper, right[:1])
+    return replace(
+        row,
+        position=position,
+        rotation=float(np.degrees(rotation)),
+        plain_position=plain_position,
+        plain_rotation=float(np.degrees(plain_rotation)),
+        confidence=action.confidence,
+    )
+
+
+def _overlap(case: Case, step: int, region: FloatArray) -> float | None:
+    keyframe = case.demonstration.keyframes[step]
+    if case.appearance is None or keyframe.object_name is None:
+        return None
+    return region_iou(region, keyframe.observation, case.appearance.instance(keyframe.object_name))
+
+
+def region_iou(region: FloatArray, observation: Observation, instance: str) -> float | None:
+    """Intersection over union of a region and of what is seen of an instance.
+
+    Does not depend on how densely the region is sampled: it follows from the share of the region's points
+    that lie on the instance and the share of the instance that lies near the region.
+
+    Args:
+        region: (M, 3) points, world frame.
+        observation: with instance ids.
+        instance: name of one of its instances.
+
+    Returns:
+        0 .. 1, or None if nothing is seen of the instance or the ids are unknown.
+    """
+    cloud = clouds.crop(clouds.fuse(observation), WORKSPACE_LOWER, WORKSPACE_UPPER)
+    names = observation.instance_names or {}
+    numbers = [number for number, name in names.items() if name == instance]
+    if cloud.ids is None or not np.isin(cloud.ids, numbers).any():
+        return None
+    if not len(region):
+        return 0.0
+    _, index = nearest(region, cloud.points)
+    precision = float(np.isin(cloud.ids[index[:, 0]], numbers).mean())
+    seen = clouds.voxel_downsample(cloud.select(np.isin(cloud.ids, numbers)), THINNED)
+    recall = float(within(seen.points, region, COVERED).mean())
+    return precision * recall / (precision + recall - precision * recall) if precision and recall else 0.0

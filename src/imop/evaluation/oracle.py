@@ -1,15 +1,24 @@
 """The upper bound of pose transfer: the demonstrated pose carried over by the true pose of the object."""
 
+from typing import Protocol
+
 from imop.errors import InvalidInput
 from imop.geometry import se3
-from imop.sim.world import World
-from imop.types import Action, Demonstration, Observation
+from imop.types import Action, Demonstration, FloatArray, Observation
+
+
+class Poses(Protocol):
+    """What knows where things are, such as a simulated world."""
+
+    def pose(self, body: str) -> FloatArray:
+        """T_world_body (4, 4) now."""
+        ...
 
 
 class OraclePolicy:
     """Reads the simulator; whatever it fails at, no transfer by one rigid object can do."""
 
-    def __init__(self, world: World):
+    def __init__(self, world: Poses):
         self._world = world
         self._demonstration: Demonstration | None = None
         self._step = 0

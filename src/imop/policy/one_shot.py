@@ -20,7 +20,8 @@ class OneShotPolicy:
     Args:
         matcher: finds the regions.
         perception: makes clouds of observations.
-        router: chooses the demonstrated step; by default they follow each other.
+        router: chooses the demonstrated step; by default they follow each other. It may be replaced before
+            anything is watched.
         min_confidence: below it `act` raises `NoConfidentMatch`; 0 acts always.
     """
 
@@ -33,7 +34,7 @@ class OneShotPolicy:
     ):
         self._matcher = matcher
         self._perception = perception
-        self._router = router or AdvancingRouter()
+        self.router = router or AdvancingRouter()
         self._min_confidence = min_confidence
         self._demonstrations: list[list[Transition]] = []
         self._prepared: list[list[PreparedStep]] = []
@@ -72,12 +73,12 @@ class OneShotPolicy:
         self._cameras |= set(observations[0].views)
         self._demonstrations.append(steps)
         self._prepared.append(list(self._matcher.prepare(steps)))
-        self._router.watch(steps)
+        self.router.watch(steps)
 
     def reset(self) -> None:
         """Begin a new episode."""
         self._hints = []
-        self._router.reset()
+        self.router.reset()
 
     def act(self, observation: Observation) -> Action:
         """The action for what is seen now, with its confidence and the matched points.
@@ -94,14 +95,14 @@ class OneShotPolicy:
                 "views", f"camera {missing[0]} is missing", f"all of {', '.join(sorted(self._cameras))}"
             )
         query = self._scene(observation)
-        number, step = self._router.route(query)
+        number, step = self.router.route(query)
         demonstrated = self._demonstrations[number][step].action
         prepared = self._prepared[number][step]
         hypotheses = prepared.match(query, self._hints)
         trust = confidence(hypotheses, demonstrated.T_world_gripper)
         if trust < self._min_confidence or not hypotheses:
             raise NoConfidentMatch(trust, self._min_confidence)
-        self._router.took(number, step)
+        self.router.took(number, step)
         best = hypotheses[0]
         self._hints = [best.T_query_support]
         T_world_gripper = _orthonormal(best.T_query_support @ demonstrated.T_world_gripper)

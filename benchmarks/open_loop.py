@@ -1,0 +1,238 @@
+"""Predicted against recorded gripper poses, open loop: each step of a scene is asked from its recorded state.
+
+In simulation: one demonstration per task and variation, and scenes that the expert was recorded in.
+
+    python benchmarks/open_loop.py --suite tabletop --split novel --scenes 3 --json open_loop.json
+
+On recordings in RLBench's layout: every ordered pair of episodes of the same task and variation. The robot is
+removed by its kinematics; no instance ids, no names.
+
+    python benchmarks/open_loop.py --demos ../shared/data/rlbench_demos --json open_loop_rlbench.json
+"""
+
+import json
+import shlex
+import sys
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import tyro
+from joblib import delayed
+from rich.console import Console
+from rich.table import Table
+
+from imop.demos.rlbench import episodes, read_episode
+from imop.errors import ImopError, InvalidInput
+from imop.evaluation.appearance import Appearance
+from imop.evaluation.benchmark import parallel
+from imop.evaluation.open_loop import Case, RecordedPoses, ask
+from imop.evaluation.open_loop_rows import COARSE, Row, by_task
+from imop.evaluation.oracle import OraclePolicy
+from imop.evaluation.picture import Panel, save_picture
+from imop.evaluation.recordings import Recordings, objects_world, user_cache
+from imop.evaluation.rollout import Policy
+from imop.evaluation.trials import Trial, make_policy, suite_trials
+from imop.files import replaced
+from imop.tasks.expert import ExpertFailed
+from imop.tasks.layout import NoRoom
+from imop.types import Action
+
+
+@dataclass
+class Options:
+    """Settings of the benchmark.
+
+    Attributes:
+        suite: of the simulated tasks.
+        split: which of its tasks.
+        tasks: comma-separated names within the suite; all of the split by default.
+        demos: a folder in RLBench's layout instead of a suite: an episode, a task, or several tasks.
+        methods: comma-separated: learned, registration, replay, oracle. By default all but learned, and without
+            oracle on recordings, which do not tell where objects are.
+        scenes: per task, with its variations in turn.
+        seed: of the first scene.
+        instance: seed of the objects.
+        json: where the results and every single prediction go.
+        pictures: folder for pictures of what the first method fails at.
+        cache: where recorded scenes are kept.
+        steps: also show every step of every task.
+        jobs: processes.
+    """
+
+    suite: str = "tabletop"
+    split: str = "all"
+    tasks: str = ""
+    demos: Path | None = None
+    methods: str = ""
+    scenes: int = 3
+    seed: int = 0
+    instance: int = 0
+    json: Path | None = None
+    pictures: Path | None = None
+    cache: Path = field(default_factory=user_cache)
+    steps: bool = False
+    jobs: int = 1
+
+
+def policy_of(method: str, poses: RecordedPoses) -> Policy:
+    return OraclePolicy(poses) if method == "oracle" else make_policy(method)
+
+
+def recorded_cases(demos: Path) -> list[Callable[[], Case]]:
+    """One case for each episode that has others of its task and variation."""
+    read = {path: read_episode(path) for path in episodes(demos)}
+    kind = {path: (episode.task, episode.variation) for path, episode in read.items()}
+    found: list[Callable[[], Case]] = []
+    for path, episode in read.items():
+        others = {p.name: read[p] for p in read if p != path and kind[p] == kind[path]}
+        if others:
+            found.append(partial(Case, episode.task, path.name, episode, others))
+    return found
+
+
+def simulated_cases(options: Options) -> list[Callable[[], Case]]:
+    """One case for each task and variation."""
+    tasks = tuple(filter(None, options.tasks.split(",")))
+    trials = suite_trials(options.suite, options.split, tasks, options.scenes, options.seed, options.instance)
+    groups: dict[tuple[str, int], list[Trial]] = {}
+    for task, of_task in trials.items():
+        for trial in of_task:
+            groups.setdefault((task, trial.variation), []).append(trial)
+    return [partial(simulated_case, task, group, options.cache) for (task, _), group in groups.items()]
+
+
+def simulated_case(task: str, trials: list[Trial], cache: Path) -> Case:
+    """The demonstration and the scenes of one task and variation, but for scenes that the expert fails in.
+
+    Raises:
+        ExpertFailed, NoRoom: if there is no demonstration.
+    """
+    recordings = Recordings(cache)
+    shown = recordings.demonstration(trials[0])
+    scenes = {str(trial.seed): recordings.scene(trial) for trial in trials}
+    queries = {name: scene for name, scene in scenes.items() if scene is not None}
+    appearance = Appearance(objects_world(trials[0]))
+    return Case(task, str(shown.seeds["episode"]), shown, queries, appearance)
+
+
+def evaluate(make_case: Callable[[], Case], methods: Iterable[str], pictures: Path | None) -> list[Row]:
+    """Rows of all methods; pictures are made of what the first one fails at."""
+    try:
+        case = make_case()
+    except (ExpertFailed, NoRoom) as error:
+        print(f"left out: {error}", file=sys.stderr)
+        return []
+    rows = []
+    for number, method in enumerate(methods):
+        draw = partial(draw_failure, pictures) if pictures and number == 0 else None
+        rows += list(ask(method, partial(policy_of, method), case, draw))
+    return rows
+
+
+def draw_failure(folder: Path, row: Row, case: Case, action: Action | None) -> None:
+    """The demonstrated step with what was predicted, and with what would have been right."""
+    if row.within(COARSE) or action is None:
+        return
+    support, query = case.demonstration.keyframes[row.step], case.queries[row.query].keyframes[row.step]
+    assert row.position is not None
+    off = f"{100 * row.position:.1f} cm, {row.rotation:.0f} deg off"
+    panels = [
+        Panel(support, query.observation, action, f"{row.task} {row.query} step {row.step}: {off}"),
+        Panel(support, query.observation, query.action, "right"),
+    ]
+    save_picture(panels, folder / f"{row.task}-{row.query}-{row.support}-{row.step}.png")
+
+
+def show(results: dict[str, dict[str, Any]], steps: bool, console: Console) -> None:
+    table = Table(title="share of predictions near the recorded pose, up to symmetry")
+    for name in ("method", "task", "step"):
+        table.add_column(name)
+    for name in ("n", "1 cm & 5°", "2 cm & 10°", "cm med (p90)", "deg med (p90)"):
+        table.add_column(name, justify="right")
+    for name in ("IoU", "routed", "ms", "conf."):
+        table.add_column(name, justify="right")
+    for method, result in results.items():
+        for task, of_task in result["tasks"].items():
+            for step, s in of_task["steps"].items() if steps else ():
+                table.add_row(method, task, step, *cells(s))
+            table.add_row(method, task, "all", *cells(of_task["all"]))
+        table.add_row(method, "all", "all", *cells(result["all"]), style="bold", end_section=True)
+    console.print(table)
+
+
+def cells(s: dict[str, Any]) -> list[str]:
+    def share(name: str) -> str:
+        low, high = s[f"{name}_interval"]
+        return f"{100 * s[name]:.0f} % [{100 * low:.0f}, {100 * high:.0f}]"
+
+    def number(value: float | None, form: str, scale: float = 1.0) -> str:
+        return "-" if value is None else format(scale * value, form)
+
+    return [
+        str(s["n"]),
+        share("within_1cm_5deg"),
+        share("within_2cm_10deg"),
+        f"{number(s['position_median_m'], '.2f', 100)} ({number(s['position_p90_m'], '.1f', 100)})",
+        f"{number(s['rotation_median_deg'], '.1f')} ({number(s['rotation_p90_deg'], '.1f')})",
+        number(s["region_iou_mean"], ".2f"),
+        number(s["routing_accuracy"], ".0%"),
+        number(s["milliseconds_median"], ".0f"),
+        number(s["confidence_median"], ".2f"),
+    ]
+
+
+def measure(options: Options, console: Console) -> dict[str, dict[str, Any]]:
+    """Everything that goes into the JSON file, by method.
+
+    Raises:
+        ImopError: for options that do not fit, or recordings that cannot be used.
+    """
+    methods = (options.methods or f"registration,replay{'' if options.demos else ',oracle'}").split(",")
+    if options.demos and "oracle" in methods:
+        raise InvalidInput("methods", "oracle", "methods that need no object poses, for recordings")
+    for method in methods:
+        policy_of(method, RecordedPoses())
+    cases = recorded_cases(options.demos) if options.demos else simulated_cases(options)
+    if not cases:
+        raise InvalidInput("demos", f"{options.demos}", "at least two episodes of one task and variation")
+    work = [delayed(evaluate)(case, methods, options.pictures) for case in cases]
+    rows = [row for some in parallel(work, options.jobs, console, "demonstrations") for row in some]
+    mine = {method: [row for row in rows if row.method == method] for method in methods}
+    return {
+        method: by_task(some) | {"rows": [row.as_dict() for row in some]}
+        for method, some in mine.items()
+        if some
+    }
+
+
+def main() -> int:
+    options = tyro.cli(Options, description=__doc__)
+    console = Console()
+    # A pipe has no width of its own; the table needs this one.
+    console = console if console.is_terminal else Console(width=150)
+    started = time.perf_counter()
+    try:
+        results = measure(options, console)
+    except ImopError as error:
+        console.print(f"[red]{error}")
+        return 2
+    show(results, options.steps, console)
+    if options.json:
+        report = {
+            "methods": results,
+            "suite": str(options.demos or options.suite),
+            "command": shlex.join(["python", *sys.argv]),
+            "seconds": time.perf_counter() - started,
+        }
+        with replaced(options.json) as temporary:
+            temporary.write_text(json.dumps(report, indent=1))
+        console.print(f"written: {options.json}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,101 @@
+"""Demonstrations of the expert that are recorded once and kept in a folder."""
+
+import hashlib
+import json
+import os
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+import imop.sim
+import imop.tasks
+from imop.demos.store import DemonstrationStore
+from imop.errors import InvalidInput
+from imop.evaluation.trials import DEMONSTRATION_SEED, Trial, demonstration_for
+from imop.files import replaced
+from imop.sim.world import World, scene_spec
+from imop.tasks.env import make_task
+from imop.tasks.expert import ExpertFailed, record_demonstration
+from imop.tasks.layout import NoRoom
+from imop.types import Demonstration
+
+
+def user_cache() -> Path:
+    """The user's folder for what can be made again."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "imop"
+
+
+class Recordings:
+    """What the expert does in given scenes; recorded when first asked for.
+
+    Recordings of another state of the simulator's or the tasks' code are not used.
+
+    Args:
+        folder: where they are kept, for all states of the code.
+    """
+
+    def __init__(self, folder: Path):
+        path = folder / f"recordings-{_state_of_the_code()}"
+        self._failed = path / "failed"
+        try:
+            self._store = DemonstrationStore.open(path / "demos.zarr")
+        except InvalidInput:
+            self._store = DemonstrationStore.create(path / "demos.zarr")
+        self._numbers = {}
+        for number, file in enumerate(sorted(Path(self._store.path).glob("episode_*/zarr.json"))):
+            a = json.loads(file.read_text())["attributes"]
+            scene, objects = a["seeds"]["episode"], a["seeds"]["instance"]
+            self._numbers[Trial(a["task"], scene, a["variation"], objects)] = number
+
+    def scene(self, trial: Trial) -> Demonstration | None:
+        """What the expert does in the trial's scene; None if it fails there."""
+        if trial in self._numbers:
+            return self._store[self._numbers[trial]]
+        failure = self._failed / "-".join(str(v).replace("/", "_") for v in asdict(trial).values())
+        if failure.exists():
+            return None
+        try:
+            recorded = record_demonstration(
+                make_task(trial.task), trial.seed, trial.variation, trial.instance
+            )
+        except (ExpertFailed, NoRoom) as error:
+            with replaced(failure) as temporary:
+                temporary.write_text(str(error))
+            return None
+        return self._kept(recorded)
+
+    def demonstration(self, trial: Trial) -> Demonstration:
+        """The demonstration of the trial's task, variation and objects, see `trials.demonstration_for`.
+
+        Raises:
+            ExpertFailed, NoRoom: as `demonstration_for`.
+        """
+        wanted = (trial.task, trial.variation, trial.instance)
+        for known, number in self._numbers.items():
+            if known.seed >= DEMONSTRATION_SEED and (known.task, known.variation, known.instance) == wanted:
+                return self._store[number]
+        return self._kept(demonstration_for(trial))
+
+    def _kept(self, recorded: Demonstration) -> Demonstration:
+        seeds = recorded.seeds
+        trial = Trial(recorded.task, seeds["episode"], recorded.variation, seeds["instance"])
+        self._numbers[trial] = self._store.append(recorded)
+        return recorded
+
+
+def objects_world(trial: Trial) -> World:
+    """The objects of the trial's task alone, not placed."""
+    task, spec = make_task(trial.task), scene_spec()
+    task.build(spec, trial.variation, np.random.default_rng((trial.instance, trial.variation)))
+    return World(spec)
+
+
+def _state_of_the_code() -> str:
+    """Short digest of everything that decides what is recorded."""
+    digest = hashlib.sha256()
+    for package in (imop.sim, imop.tasks):
+        for folder in package.__path__:
+            for file in sorted(Path(folder).rglob("*.py")):
+                digest.update(file.read_bytes())
+    return digest.hexdigest()[:12]
