@@ -51,7 +51,7 @@ class Options:
         split: which of its tasks.
         tasks: comma-separated names within the suite; all of the split by default.
         demos: a folder in RLBench's layout instead of a suite: an episode, a task, or several tasks.
-        methods: comma-separated: learned, registration, replay, oracle. By default all but learned, and without
+        methods: comma-separated: learned, registration, replay, oracle. By default all but learned, and no
             oracle on recordings, which do not tell where objects are.
         scenes: per task, with its variations in turn.
         seed: of the first scene.
