@@ -212,6 +212,7 @@ def _compared(row: Row, action: Action, recorded: Demonstration, appearance: App
     plain_position, plain_rotation = errors(action.T_world_gripper, right[:1])
     return replace(
         row,
+        pose=tuple(se3.to_pose7(action.T_world_gripper).tolist()),
         position=position,
         rotation=float(np.degrees(rotation)),
         plain_position=plain_position,

@@ -25,6 +25,7 @@ class Row:
         step: number of the keyframe.
         object: what the step is fixed to, where known.
         problem: why nothing was predicted; empty if something was.
+        pose: the predicted position and quaternion xyzw.
         position: metres to the nearest right pose, see `equal_poses`; None if nothing was predicted.
         rotation: degrees to the same pose.
         plain_position: metres to the recorded pose itself.
@@ -43,6 +44,7 @@ class Row:
     step: int
     object: str | None
     problem: str = ""
+    pose: tuple[float, ...] | None = None
     position: float | None = None
     rotation: float | None = None
     plain_position: float | None = None
