@@ -3,6 +3,7 @@ import os
 import socket
 import subprocess
 import sys
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,18 +14,20 @@ from imop.errors import CorruptData, InvalidInput
 from imop.networks.graph import GraphConfig
 from imop.networks.matching import MatchingConfig
 from imop.networks.model import Model, ModelConfig, load_model, save_model
-from imop.networks.routing import RoutingConfig
 from imop.training.data import PairDataset, loader
 from imop.training.loop import CHECKPOINT, LOG, TrainConfig, schedule, train
+from imop.training.route_shards import write_routes
 from imop.training.shards import write_shard
-from tests.networks.test_networks import REGION, TINY
+from tests.networks.test_networks import REGION, ROUTING, TINY
 from tests.training.test_pairs import pair
+from tests.training.test_routes import route
 
 CONFIG = ModelConfig(
     GraphConfig(max_points=100),
     REGION,
     MatchingConfig(TINY, layers=2, max_region=30),
-    RoutingConfig(TINY, 32),
+    ROUTING,
+    route_graph=GraphConfig(max_points=60),
 )
 
 
@@ -33,6 +36,13 @@ def shards(tmp_path_factory):
     folder = tmp_path_factory.mktemp("shards")
     for k in range(2):
         write_shard([pair(3 * k + i) for i in range(3)], folder / f"{k}.npz")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def routes(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("routes")
+    write_routes([route(0), route(1)], folder / "0.npz")
     return folder
 
 
@@ -59,6 +69,44 @@ def test_stopped_and_resumed_training_is_the_same_training(shards, tmp_path):
     assert all(torch.equal(a[name], b[name]) for name in a)
 
 
+def test_networks_learn_together_or_apart_and_are_resumed_bit_by_bit(shards, routes, tmp_path):
+    together = {"routes": (routes,), "networks": ("region", "matching", "routing")}
+    whole = train(config(shards, tmp_path / "a", **together), CONFIG)
+    assert set(whole[0]) == {"focal", "dice", "matching", "routing"}
+    first = train(config(shards, tmp_path / "b", **together), CONFIG, stop_at=2)
+    assert whole == first + train(config(shards, tmp_path / "b", **together), CONFIG)
+    apart = {"train": (), "routes": (routes,), "networks": ("routing",), "validate_routes": (routes,)}
+    alone = train(config(shards, tmp_path / "c", **apart), CONFIG)
+    assert [set(losses) for losses in alone] == [{"routing"}] * 6
+    untouched, learned = weights(tmp_path / "c"), weights(tmp_path / "a")
+    torch.manual_seed(0)
+    for name, value in Model(CONFIG).state_dict().items():
+        assert torch.equal(value, untouched[name]) == (not name.startswith("routing.")), name
+        assert not torch.equal(value, learned[name]), name
+    metrics = json.loads((tmp_path / "c" / LOG).read_text().splitlines()[-1])["validation"][routes.name]
+    assert set(metrics) == {"routing", "routing_blind", "routing_mishaps"}
+
+
+def test_a_checkpoint_gives_only_what_is_trained(shards, routes, tmp_path):
+    """So that a network of another shape does not stop the others."""
+    train(config(shards, tmp_path), CONFIG, stop_at=3)
+    wider = replace(CONFIG, routing=replace(CONFIG.routing, width=16))
+    before = weights(tmp_path)
+    train(config(shards, tmp_path), wider, stop_at=4)
+    assert load_model(tmp_path).config == wider
+    assert not torch.equal(
+        before["region.backbone.embed.0.weight"], weights(tmp_path)["region.backbone.embed.0.weight"]
+    )
+
+
+@pytest.mark.parametrize("network", ["region", "matching"])
+def test_one_network_alone(shards, tmp_path, network):
+    before = train(config(shards, tmp_path, networks=(network,)), CONFIG, stop_at=1)
+    assert set(before[0]) <= {"focal", "dice", "matching"} and ("matching" in before[0]) == (
+        network == "matching"
+    )
+
+
 def test_it_validates_logs_and_saves_weights_that_load(shards, tmp_path):
     train(config(shards, tmp_path, validate=(shards,), validation_pairs=3), CONFIG)
     records = [json.loads(line) for line in (tmp_path / LOG).read_text().splitlines()]
@@ -80,6 +128,10 @@ def test_a_damaged_checkpoint_is_named(shards, tmp_path):
 def test_nothing_to_train_on(tmp_path):
     with pytest.raises(InvalidInput, match="train"):
         train(config(tmp_path, tmp_path, train=()), CONFIG)
+    with pytest.raises(InvalidInput, match="routes"):
+        train(config(tmp_path, tmp_path, train=(), networks=("routing",)), CONFIG)
+    with pytest.raises(InvalidInput, match="train"):
+        train(config(tmp_path, tmp_path, routes=(tmp_path,), networks=("routing",)), CONFIG)
     with pytest.raises(CorruptData, match="shard"):
         train(config(tmp_path, tmp_path), CONFIG)
 
@@ -122,13 +174,13 @@ import sys
 from pathlib import Path
 from tests.training.test_loop import CONFIG, config
 from imop.training.loop import train
-train(config(Path(sys.argv[1]), Path(sys.argv[2]), batch=1, steps=1), CONFIG)
+train(config(Path(sys.argv[1]), Path(sys.argv[2]), batch=1, steps=1, mixed=False), CONFIG)
 """
 
 
 def test_two_processes_train_as_one(shards, tmp_path):
-    """One step of two processes with a pair each is one step with both pairs."""
-    train(config(shards, tmp_path / "one", steps=1), CONFIG)
+    """One step of two processes with a pair each is one step with both pairs, up to rounding."""
+    train(config(shards, tmp_path / "one", steps=1, mixed=False), CONFIG)
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]

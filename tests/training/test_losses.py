@@ -1,8 +1,10 @@
 import math
 
+import numpy as np
 import pytest
 import torch
 
+from imop.geometry import se3
 from imop.training import losses
 
 ONE = torch.zeros(2, dtype=torch.int64)
@@ -69,8 +71,32 @@ def test_a_batch_in_which_nothing_is_visible_gives_zero_and_a_gradient():
 
 def test_routing_by_hand():
     scores = torch.log(torch.tensor([[1.0, 3.0]]))
-    assert losses.routing(scores, torch.tensor([1])).item() == pytest.approx(
-        -0.0625 * math.log(0.75), rel=1e-5
-    )
+    second = torch.tensor([[False, True]])
+    assert losses.routing(scores, second).item() == pytest.approx(-0.0625 * math.log(0.75), rel=1e-5)
     missing = torch.tensor([[0.0, -1e9]])
-    assert losses.routing(missing, torch.tensor([0])).item() == 0
+    assert losses.routing(missing, ~second).item() == 0
+
+
+def test_routing_takes_any_right_step():
+    scores = torch.log(torch.tensor([[1.0, 3.0, 4.0]]))
+    either = torch.tensor([[False, True, True]])
+    assert losses.routing(scores, either).item() == pytest.approx(-((1 / 8) ** 2) * math.log(7 / 8), rel=1e-5)
+
+
+def test_pose_by_hand():
+    """5 cm are one unit; half a turn changes two columns by 2 each, so |dR| = sqrt(8), and 0.5 is one unit."""
+    right = torch.eye(4)[None]
+    shifted = torch.eye(4)[None].clone()
+    shifted[0, 0, 3] = 0.05
+    half_turn = torch.from_numpy(se3.make(np.diag([-1.0, -1.0, 1.0]))).float()[None]
+    assert losses.pose(right, [right]).item() == 0
+    assert losses.pose(shifted, [right]).item() == pytest.approx(math.sqrt(2) - 1, rel=1e-5)
+    assert losses.pose(half_turn, [right]).item() == pytest.approx(math.sqrt(1 + 8 / 0.25) - 1, rel=1e-5)
+
+
+def test_the_nearest_right_pose_counts():
+    right, other = torch.eye(4), torch.from_numpy(se3.make(np.diag([-1.0, -1.0, 1.0]), (0.3, 0, 0))).float()
+    found = torch.stack([right, other])
+    assert losses.pose(found, [torch.stack([other, right])] * 2).item() == 0
+    assert losses.pose(found, [right[None], other[None]]).item() == 0
+    assert losses.pose(found, [right[None]] * 2).item() > 1

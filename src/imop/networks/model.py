@@ -19,22 +19,27 @@ from imop.networks.graph import POINT_FEATURES, GraphConfig
 from imop.networks.matching import MatchingConfig, MatchingNetwork
 from imop.networks.pose import PoseConfig, pose_network
 from imop.networks.region import GRIPPER_FEATURES, RegionConfig, RegionNetwork
-from imop.networks.routing import RoutingConfig, RoutingNetwork
+from imop.networks.routing import HAND_FEATURES, RoutingConfig, RoutingNetwork
 
 VERSION = 1
 CARD = "card.json"
 WEIGHTS = "weights.safetensors"
+NETWORKS = ("region", "matching", "routing")
 
 
 @dataclass(frozen=True)
 class ModelConfig:
-    """Everything that decides the shape of the networks and of what they see. The defaults are `small`."""
+    """Everything that decides the shape of the networks and of what they see. The defaults are `small`.
+
+    `graph` is for region and matching; `route_graph` for routing, which needs less detail.
+    """
 
     graph: GraphConfig = field(default_factory=GraphConfig)
     region: RegionConfig = field(default_factory=RegionConfig)
     matching: MatchingConfig = field(default_factory=MatchingConfig)
     routing: RoutingConfig = field(default_factory=RoutingConfig)
     pose: PoseConfig = field(default_factory=PoseConfig)
+    route_graph: GraphConfig = field(default_factory=lambda: GraphConfig(0.02, 0.08, max_points=256))
 
 
 SMALL = ModelConfig()
@@ -53,7 +58,10 @@ PAPER = ModelConfig(
         max_region=1000,
     ),
     RoutingConfig(
-        BackboneConfig(widths=(128, 256, 512), depths=(2, 2, 5), group_width=16), width=512, layers=4, heads=8
+        BackboneConfig(POINT_FEATURES + HAND_FEATURES, (128, 256, 512), (2, 2, 5), group_width=16),
+        width=512,
+        layers=4,
+        heads=8,
     ),
 )
 """The paper's size, 80.8 M parameters in all; how they are spread over the networks it does not say."""

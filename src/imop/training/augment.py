@@ -1,5 +1,6 @@
 """What a pair may look like without its truth changing."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -80,3 +81,15 @@ def _worse(
     thinner = cloud.select(keep)
     noisy = thinner.points + rng.normal(0, JITTER, thinner.points.shape)
     return replace(thinner, points=noisy), inside[keep]
+
+
+def seen_differently(
+    clouds: Sequence[PointCloud], queries: int, rng: np.random.Generator
+) -> list[PointCloud]:
+    """A route's states in other light, seen less well; the first `queries` in one light, the rest in another.
+
+    Nothing moves, for the networks that see them do not notice where a state stands.
+    """
+    light = _light(rng, 0.25)
+    lights = (light @ _light(rng, 0.06), light)
+    return [_lit(_worse(cloud, rng)[0], lights[int(i >= queries)]) for i, cloud in enumerate(clouds)]

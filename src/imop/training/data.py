@@ -1,8 +1,8 @@
 """Samples by number: a number always gives the same sample, so training can be resumed anywhere."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, Protocol, TypeVar, overload
 
 import numpy as np
 from torch.utils.data import DataLoader, Dataset
@@ -11,7 +11,11 @@ from imop.errors import CorruptData
 from imop.networks.model import ModelConfig
 from imop.training.augment import augment
 from imop.training.pairs import PairBatch, Sample, collate_samples, make_sample
+from imop.training.route_batch import RouteBatch, RouteSample, collate_routes, make_route_sample
+from imop.training.route_shards import RouteShard
 from imop.training.shards import Shard
+
+Item = TypeVar("Item", covariant=True)
 
 
 class PairDataset(Dataset[Sample]):
@@ -29,39 +33,105 @@ class PairDataset(Dataset[Sample]):
 
     def __init__(self, folders: Sequence[Path], config: ModelConfig, seed: int, augmented: bool = True):
         self._config, self._seed, self._augmented = config, seed, augmented
-        self._shards = [_shards(folder) for folder in folders]
-        self._ends = [np.cumsum([len(shard) for shard in shards]) for shards in self._shards]
+        self._source = _Source(folders, Shard)
 
     def __len__(self) -> int:
-        return int(sum(ends[-1] for ends in self._ends))
+        return len(self._source)
 
     def __getitem__(self, index: int) -> Sample:
         rng = np.random.default_rng((self._seed, index))
-        source = int(rng.integers(len(self._shards)))
-        ends = self._ends[source]
-        number = int(rng.integers(ends[-1])) if self._augmented else index % int(ends[-1])
-        shard = int(np.searchsorted(ends, number, side="right"))
-        pair = self._shards[source][shard][number - (int(ends[shard - 1]) if shard else 0)]
+        pair = self._source.pick(rng, None if self._augmented else index)
         if self._augmented:
             pair = augment(pair, rng)
-        return make_sample(pair, self._config.graph, self._config.matching.max_region, rng)
+        matching = self._config.matching
+        return make_sample(pair, self._config.graph, matching.max_region, rng, matching.region_first)
 
 
-def loader(dataset: PairDataset, numbers: Sequence[int], batch: int, workers: int) -> DataLoader[PairBatch]:
+class RouteDataset(Dataset[RouteSample]):
+    """Routes from folders of shards, augmented as in `make_route_sample`.
+
+    Args:
+        folders: of shards; each is drawn from equally often.
+        config: how clouds become graphs.
+        seed: of sources, routes, queries and augmentation.
+        augmented: whether to augment at all; validation does not.
+        blind: whether queries that are not augmented do without what is expected.
+
+    Raises:
+        CorruptData: if a folder has no shard, or one cannot be read.
+    """
+
+    def __init__(
+        self,
+        folders: Sequence[Path],
+        config: ModelConfig,
+        seed: int,
+        augmented: bool = True,
+        blind: bool = False,
+    ):
+        self._config, self._seed, self._augmented, self._blind = config, seed, augmented, blind
+        self._source = _Source(folders, RouteShard)
+
+    def __len__(self) -> int:
+        return len(self._source)
+
+    def __getitem__(self, index: int) -> RouteSample:
+        rng = np.random.default_rng((self._seed, index))
+        route = self._source.pick(rng, None if self._augmented else index)
+        drawn = rng if self._augmented else None
+        return make_route_sample(route, self._config.route_graph, drawn, self._blind)
+
+
+@overload
+def loader(
+    dataset: PairDataset, numbers: Sequence[int], batch: int, workers: int
+) -> DataLoader[PairBatch]: ...
+@overload
+def loader(
+    dataset: RouteDataset, numbers: Sequence[int], batch: int, workers: int
+) -> DataLoader[RouteBatch]: ...
+def loader(
+    dataset: PairDataset | RouteDataset, numbers: Sequence[int], batch: int, workers: int
+) -> DataLoader[Any]:
     """Batches of the samples with the given numbers, in order."""
     return DataLoader[Any](
         dataset,
         batch_size=batch,
         sampler=numbers,
         num_workers=workers,
-        collate_fn=collate_samples,
+        collate_fn=collate_samples if isinstance(dataset, PairDataset) else collate_routes,
         prefetch_factor=4 if workers else None,
         multiprocessing_context="fork" if workers else None,
     )
 
 
-def _shards(folder: Path) -> list[Shard]:
+class _Items(Protocol[Item]):
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, index: int, /) -> Item: ...
+
+
+class _Source(Generic[Item]):
+    """Everything in the shards of some folders."""
+
+    def __init__(self, folders: Sequence[Path], read: Callable[[Path], _Items[Item]]):
+        self._shards = [[read(path) for path in _paths(folder)] for folder in folders]
+        self._ends = [np.cumsum([len(shard) for shard in shards]) for shards in self._shards]
+
+    def __len__(self) -> int:
+        return int(sum(ends[-1] for ends in self._ends))
+
+    def pick(self, rng: np.random.Generator, index: int | None) -> Item:
+        """Anything from any folder; with an `index` that one of the folder."""
+        source = int(rng.integers(len(self._shards)))
+        ends = self._ends[source]
+        number = int(rng.integers(ends[-1])) if index is None else index % int(ends[-1])
+        shard = int(np.searchsorted(ends, number, side="right"))
+        return self._shards[source][shard][number - (int(ends[shard - 1]) if shard else 0)]
+
+
+def _paths(folder: Path) -> list[Path]:
     paths = sorted(folder.glob("*.npz"))
     if not paths:
-        raise CorruptData(folder, "holds no shard (*.npz)", "generate training pairs into it")
-    return [Shard(path) for path in paths]
+        raise CorruptData(folder, "holds no shard (*.npz)", "generate training data into it")
+    return paths

@@ -1,34 +1,39 @@
-"""Training of the region and matching networks, stopped and resumed at any step without a trace.
+"""Training of the networks, together or apart, stopped and resumed at any step without a trace.
 
 python -m imop.training.loop --out runs/train --train PATH --validate PATH
+python -m imop.training.loop --out runs/routing --networks routing --routes PATH --validate-routes PATH
 """
 
 import json
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import repeat
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import torch
 import tyro
 from lightning_fabric import Fabric
 from torch import Tensor, nn
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
-from torch.utils.data import DataLoader
 from torch.utils.tensorboard import SummaryWriter
 
 from imop.errors import CorruptData, InvalidInput
 from imop.files import replaced
-from imop.networks.model import Model, ModelConfig, save_model
+from imop.networks.model import NETWORKS, Model, ModelConfig, save_model
 from imop.training import losses
-from imop.training.data import PairDataset, loader
-from imop.training.metrics import validate
+from imop.training.data import PairDataset, RouteDataset, loader
+from imop.training.metrics import validate, validate_routes
 from imop.training.pairs import PairBatch
+from imop.training.route_batch import RouteBatch
 
 CHECKPOINT = "checkpoint.pt"
 LOG = "log.jsonl"
+
+Network = Literal["region", "matching", "routing"]
+Batch = tuple[PairBatch | None, RouteBatch | None]
 
 
 @dataclass(frozen=True)
@@ -37,25 +42,31 @@ class TrainConfig:
 
     Attributes:
         out: folder of the checkpoint, the weights and the log.
-        train: folders of shards to train on, equally often.
-        validate: folders of shards to validate on, each reported by its name.
+        train: folders of shards of pairs to train region and matching on, equally often.
+        validate: folders of shards to validate them on, each reported by its name.
+        routes: folders of shards of routes to train routing on, equally often.
+        validate_routes: folders of shards to validate it on, each reported by its name.
+        networks: which are trained; the others stay as they are at the beginning.
         steps: optimizer steps in all.
-        batch: pairs per step and process.
+        batch: pairs, and routes, per step and process.
         learning_rate: at its peak.
         warm_up: steps until the peak; a cosine to 1 % follows.
         weight_decay: of AdamW.
         clip: largest norm of the gradient.
         ema: decay of the averaged weights, which are the ones that are saved and validated.
         every: steps between validations and checkpoints.
-        validation_pairs: how many of each folder.
+        validation_pairs: how many pairs, or routes, of each folder.
         seed: of weights, data and augmentation.
         workers: processes that prepare samples.
         mixed: whether products within the networks are made in bfloat16; sums and places stay in float32.
     """
 
     out: Path
-    train: tuple[Path, ...]
+    train: tuple[Path, ...] = ()
     validate: tuple[Path, ...] = ()
+    routes: tuple[Path, ...] = ()
+    validate_routes: tuple[Path, ...] = ()
+    networks: tuple[Network, ...] = ("region", "matching")
     steps: int = 20_000
     batch: int = 8
     learning_rate: float = 1e-3
@@ -71,25 +82,43 @@ class TrainConfig:
 
 
 class PairLoss(nn.Module):
-    """Batch of pairs -> losses of the region and matching networks, one module that can be distributed."""
+    """Batch of pairs -> losses of the region and matching networks, as far as they are trained."""
 
-    def __init__(self, model: Model):
+    def __init__(self, model: Model, networks: tuple[Network, ...]):
         super().__init__()
-        self.region = model.region
-        self.matching = model.matching
+        self.region = model.region if "region" in networks else None
+        self.matching = model.matching if "matching" in networks else None
 
     def forward(self, batch: PairBatch) -> dict[str, Tensor]:
         """The region's focal and Dice losses over all stages, and the matching's over all layers."""
         before = batch.step.before
-        stages = self.region(batch.step)
-        found = self.matching(before, batch.chosen, batch.query)
-        focal = [losses.focal(stage, batch.region, before.cloud, before.size) for stage in stages]
-        dice = [losses.dice(stage, batch.region, before.cloud, before.size) for stage in stages]
-        return {
-            "focal": torch.stack(focal).sum(),
-            "dice": torch.stack(dice).sum(),
-            "matching": losses.matching(found.layers, batch.targets),
-        }
+        parts: dict[str, Tensor] = {}
+        if self.region is not None:
+            stages = self.region(batch.step)
+            focal = [losses.focal(stage, batch.region, before.cloud, before.size) for stage in stages]
+            dice = [losses.dice(stage, batch.region, before.cloud, before.size) for stage in stages]
+            parts |= {"focal": torch.stack(focal).sum(), "dice": torch.stack(dice).sum()}
+        if self.matching is not None:
+            found = self.matching(before, batch.chosen, batch.query)
+            parts["matching"] = losses.matching(found.layers, batch.targets)
+        return parts
+
+
+class Objective(nn.Module):
+    """Batches -> losses of all networks that are trained, one module that can be distributed."""
+
+    def __init__(self, model: Model, networks: tuple[Network, ...]):
+        super().__init__()
+        self.pairs = PairLoss(model, networks)
+        self.routing = model.routing if "routing" in networks else None
+
+    def forward(self, pairs: PairBatch | None, routes: RouteBatch | None) -> dict[str, Tensor]:
+        """Losses by name."""
+        parts = {} if pairs is None else self.pairs(pairs)
+        if routes is not None and self.routing is not None:
+            scores, _ = self.routing(routes.shown, routes.demonstration, routes.query, routes.of)
+            parts["routing"] = losses.routing(scores, routes.right)
+        return parts
 
 
 class TrainState:
@@ -97,8 +126,9 @@ class TrainState:
 
     def __init__(self, model: Model, config: TrainConfig):
         self.model = model
+        self.networks = tuple(name for name in NETWORKS if name in config.networks)
         self.average = AveragedModel(model, multi_avg_fn=_moving_average(config.ema))
-        trained = [*model.region.parameters(), *model.matching.parameters()]
+        trained = [p for name in self.networks for p in getattr(model, name).parameters()]
         self.optimizer = torch.optim.AdamW(trained, lr=config.learning_rate, weight_decay=config.weight_decay)
         self.step = 0
 
@@ -112,12 +142,20 @@ class TrainState:
             return
         try:
             saved = torch.load(path, map_location="cpu", weights_only=True)
-            self.model.load_state_dict(saved["model"])
-            self.average.load_state_dict(saved["average"])
+            self._load(self.model, saved["model"], "")
+            self._load(self.average, saved["average"], "module.")
+            self.average.n_averaged.copy_(saved["average"]["n_averaged"])
             self.optimizer.load_state_dict(saved["optimizer"])
             self.step = int(saved["step"])
         except Exception as error:
             raise CorruptData(path, f"is not a checkpoint of these networks ({error})") from error
+
+    def _load(self, module: nn.Module, weights: dict[str, Tensor], prefix: str) -> None:
+        """Only of networks that are trained: the others may have had another shape then."""
+        for name in self.networks:
+            start = f"{prefix}{name}."
+            own = {k.removeprefix(start): w for k, w in weights.items() if k.startswith(start)}
+            module.get_submodule(prefix + name).load_state_dict(own)
 
     def save(self, path: Path) -> None:
         """Write the checkpoint, whole or not at all."""
@@ -148,19 +186,18 @@ def train(
         CorruptData: if shards or the checkpoint cannot be read.
         InvalidInput: if there is nothing to train on.
     """
-    if not config.train:
-        raise InvalidInput("train", "no folder", "at least one folder of shards")
+    _check(config)
     fabric = Fabric()
     fabric.launch()
     torch.manual_seed(config.seed)
     state = TrainState(Model(model_config or ModelConfig()), config)
     state.load(config.out / CHECKPOINT)
-    module, optimizer = fabric.setup(PairLoss(state.model), state.optimizer)
+    module, optimizer = fabric.setup(Objective(state.model, config.networks), state.optimizer)
     state.average.to(fabric.device)
     last = min(config.steps, stop_at or config.steps)
     history = []
     for batch in _batches(config, state, last, fabric.world_size, fabric.global_rank):
-        history.append(_step(fabric, module, optimizer, batch.to(fabric.device), config, state))
+        history.append(_step(fabric, module, optimizer, batch, config, state))
         if state.step % config.every == 0 or state.step == last:
             if fabric.is_global_zero:
                 _report(config, state, history[-config.every :])
@@ -168,31 +205,47 @@ def train(
     return history
 
 
-def _batches(
-    config: TrainConfig, state: TrainState, last: int, world: int, rank: int
-) -> DataLoader[PairBatch]:
+def _check(config: TrainConfig) -> None:
+    pairs, routes = set(config.networks) - {"routing"}, "routing" in config.networks
+    if not config.networks:
+        raise InvalidInput("networks", "none", f"some of {', '.join(NETWORKS)}")
+    for name, needed in (("train", bool(pairs)), ("routes", routes)):
+        if needed != bool(getattr(config, name)):
+            has = "no folder" if needed else "a folder"
+            raise InvalidInput(name, f"{has} for {', '.join(config.networks)}", "shards of what is trained")
+
+
+def _batches(config: TrainConfig, state: TrainState, last: int, world: int, rank: int) -> Iterator[Batch]:
     """The batches of one process from the state's step on; samples count over all processes and steps."""
-    dataset = PairDataset(config.train, state.model.config, config.seed)
     numbers = [
         (step * world + rank) * config.batch + i
         for step in range(state.step, last)
         for i in range(config.batch)
     ]
-    return loader(dataset, numbers, config.batch, config.workers)
+    shape = state.model.config
+    pairs: Iterator[PairBatch | None] = repeat(None)
+    routes: Iterator[RouteBatch | None] = repeat(None)
+    if config.train:
+        dataset = PairDataset(config.train, shape, config.seed)
+        pairs = iter(loader(dataset, numbers, config.batch, config.workers))
+    if config.routes:
+        routed = RouteDataset(config.routes, shape, config.seed)
+        routes = iter(loader(routed, numbers, config.batch, config.workers))
+    return zip(pairs, routes, strict=False)
 
 
 def _step(
     fabric: Fabric,
     module: nn.Module,
     optimizer: torch.optim.Optimizer,
-    batch: PairBatch,
+    batch: Batch,
     config: TrainConfig,
     state: TrainState,
 ) -> dict[str, float]:
     for group in optimizer.param_groups:
         group["lr"] = config.learning_rate * schedule(state.step, config.warm_up, config.steps)
     with torch.autocast(fabric.device.type, torch.bfloat16, enabled=config.mixed):
-        parts = module(batch)
+        parts = module(*(None if part is None else part.to(fabric.device) for part in batch))
     loss = torch.stack(list(parts.values())).sum()
     optimizer.zero_grad()
     fabric.backward(loss)
@@ -217,6 +270,8 @@ def _report(config: TrainConfig, state: TrainState, recent: list[dict[str, float
     average = state.average.module
     assert isinstance(average, Model)
     found = {folder.name: validate(average, folder, config.validation_pairs) for folder in config.validate}
+    for folder in config.validate_routes:
+        found[folder.name] = validate_routes(average, folder, config.validation_pairs)
     record = {"step": state.step, "time": time.time(), "losses": means, "validation": found}
     config.out.mkdir(parents=True, exist_ok=True)
     with (config.out / LOG).open("a") as log:
@@ -224,9 +279,9 @@ def _report(config: TrainConfig, state: TrainState, recent: list[dict[str, float
     with SummaryWriter(str(config.out)) as writer:
         for name, value in means.items():
             writer.add_scalar(f"loss/{name}", value, state.step)
-        for folder, metrics in found.items():
+        for source, metrics in found.items():
             for name, value in metrics.items():
-                writer.add_scalar(f"{folder}/{name}", value, state.step)
+                writer.add_scalar(f"{source}/{name}", value, state.step)
     state.save(config.out / CHECKPOINT)
     card = {"step": state.step, "seed": config.seed, "losses": means, "validation": found}
     save_model(average, config.out, card)

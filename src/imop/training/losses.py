@@ -69,7 +69,29 @@ def _pairs(matrix: Tensor, pairs: Tensor) -> Tensor:
     return -((1 - p) ** GAMMA * p.log()).mean()
 
 
-def routing(scores: Tensor, step: Tensor) -> Tensor:
-    """Mean focal loss of the true step (B,) under the softmax of scores (B, L)."""
-    log_p = scores.log_softmax(dim=1).gather(1, step[:, None])[:, 0]
+def routing(scores: Tensor, right: Tensor) -> Tensor:
+    """Mean focal loss of the right steps under the softmax of scores (B, L).
+
+    Of several right steps, marked in `right` (B, L), any will do: their probabilities add up.
+    """
+    log_p = scores.log_softmax(dim=1).masked_fill(~right, -torch.inf).logsumexp(dim=1)
     return -((1 - log_p.exp()) ** GAMMA * log_p).mean()
+
+
+def pose(found: Tensor, right: Sequence[Tensor]) -> Tensor:
+    """Mean over samples of how far a pose is from the nearest right one.
+
+    Args:
+        found: (B, 4, 4).
+        right: per sample (S, 4, 4).
+
+    Distance in units of 5 cm and turn in units of about 20 degrees, each linear where it is more than one.
+    """
+    losses = []
+    for T, several in zip(found, right, strict=True):
+        several = several.to(T)
+        away = (T[:3, 3] - several[:, :3, 3]).square().sum(-1)
+        turn = (T[:3, :3] - several[:, :3, :3]).square().sum((-2, -1))
+        far = torch.stack([away / 0.05**2, turn / 0.5**2])
+        losses.append((1 + far).sqrt().sub(1).sum(0).min())
+    return torch.stack(losses).mean()

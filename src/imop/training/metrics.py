@@ -4,12 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from torch import Tensor
 
 from imop.geometry import se3
 from imop.networks.matching import reposition
 from imop.networks.model import Model
-from imop.training.data import PairDataset, loader
+from imop.training.data import PairDataset, RouteDataset, loader
 from imop.training.pairs import PairBatch
+from imop.training.route_batch import RouteBatch
 from imop.types import FloatArray
 
 _BATCH = 8
@@ -34,6 +36,38 @@ def validate(model: Model, folder: Path, count: int) -> dict[str, float]:
                 found.setdefault(name, []).extend(values)
     model.train(training)
     return {name: float(np.mean(values)) for name, values in found.items()}
+
+
+def validate_routes(model: Model, folder: Path, count: int) -> dict[str, float]:
+    """Means over the queries of the first `count` routes of a folder of shards, without augmentation.
+
+    Returns:
+        routing: share of the queries for which the best step is a right one. routing_blind: likewise, without
+        being told which step is expected. routing_mishaps: of the queries in which another step than the
+        expected one is right.
+    """
+    found: dict[str, list[float]] = {"routing": [], "routing_blind": [], "routing_mishaps": []}
+    training = model.training
+    model.eval()
+    with torch.no_grad():
+        for blind in (False, True):
+            dataset = RouteDataset([folder], model.config, seed=0, augmented=False, blind=blind)
+            for batch in loader(dataset, range(min(count, len(dataset))), _BATCH, workers=0):
+                scores, _ = model.routing(batch.shown, batch.demonstration, batch.query, batch.of)
+                right = batch.right.gather(1, scores.argmax(dim=1, keepdim=True))[:, 0]
+                found["routing_blind" if blind else "routing"] += right.float().tolist()
+                if not blind:
+                    found["routing_mishaps"] += right[_mishaps(batch)].float().tolist()
+    model.train(training)
+    return {name: float(np.mean(values)) for name, values in found.items() if values}
+
+
+def _mishaps(batch: RouteBatch) -> Tensor:
+    """(Q,) True where the expected step is not right."""
+    expected = batch.query.step.long()
+    past_the_end = expected >= batch.right.shape[1]
+    known = batch.right.gather(1, expected.clamp(0, batch.right.shape[1] - 1)[:, None])[:, 0]
+    return past_the_end | ~known
 
 
 def _measure(model: Model, batch: PairBatch) -> dict[str, list[float]]:

@@ -1,0 +1,152 @@
+"""Routes: synthetic ones, their shards, their tensors."""
+
+import numpy as np
+import pytest
+import torch
+
+from imop.errors import CorruptData, InvalidInput
+from imop.networks.graph import GraphConfig
+from imop.networks.routing import UNKNOWN
+from imop.training.families import TRAINING
+from imop.training.generate import generate
+from imop.training.mishaps import mishaps
+from imop.training.route_batch import QUERIES, collate_routes, make_route_sample
+from imop.training.route_shards import RouteShard, write_routes
+from imop.training.routes import Query, Route, Seen, indistinguishable, synthetic_routes
+from imop.training.scenes import demonstrate, draw_scene
+from imop.training.shards import Shard
+from imop.training.stage import Unreachable
+from tests.networks.scenes import tabletop
+from tests.networks.test_networks import GOAL
+
+GRAPH = GraphConfig(max_points=60)
+
+
+def seen(seed, opening=1.0):
+    return Seen(tabletop(seed), GOAL, opening)
+
+
+def route(seed=0, steps=3):
+    """As many queries as steps, and one after a mishap."""
+    states = tuple(seen(seed + i, i / steps) for i in range(steps))
+    queries = tuple(Query(seen(seed + 20 + i), i, np.arange(steps) == i) for i in range(steps))
+    return Route(states, (*queries, Query(seen(seed + 40), steps, np.arange(steps) == 0)))
+
+
+@pytest.fixture(scope="module")
+def made():
+    return list(synthetic_routes(2, 8, TRAINING))
+
+
+def test_every_state_but_the_last_is_asked_about(made):
+    for r in made:
+        plain = [q for q in r.queries[: len(r.states)]]
+        assert [q.expected for q in plain] == list(range(len(r.states)))
+        assert all(q.right[q.expected] for q in plain)
+        assert all(q.right.shape == (len(r.states),) for q in r.queries)
+
+
+def test_mishaps_are_asked_about_and_never_skip_a_step(made):
+    wrong = [q for r in made for q in r.queries[len(r.states) :]]
+    assert wrong
+    assert all(np.flatnonzero(q.right)[0] <= q.expected for q in wrong)
+    assert any(not q.right[q.expected] for q in wrong if q.expected < len(q.right))
+
+
+def test_the_same_seed_gives_the_same_routes(made):
+    (again,) = synthetic_routes(2, 1, TRAINING)
+    for a, b in zip(made[0].queries, again.queries, strict=True):
+        np.testing.assert_array_equal(a.seen.cloud.points, b.seen.cloud.points)
+        np.testing.assert_array_equal(a.right, b.right)
+
+
+def test_queries_stand_elsewhere(made):
+    moved = [np.abs(r.states[0].T_world_gripper - r.queries[0].seen.T_world_gripper).max() for r in made]
+    assert min(moved) > 0.01
+
+
+def executions(count):
+    rng = np.random.default_rng(5)
+    while count:
+        try:
+            scene = draw_scene(TRAINING, rng, (0.5, 0.5))
+            states = demonstrate(scene, rng)
+        except Unreachable:
+            continue
+        count -= 1
+        yield scene, states, rng
+
+
+def test_after_a_mishap_nothing_lost_is_in_the_hand():
+    """With which step one goes on says what must be held then: what was held when it was demonstrated."""
+    checked = 0
+    for scene, states, rng in executions(12):
+        for mishap in mishaps(scene, states, rng, 6):
+            assert (mishap.state.held is None) == (states[mishap.right].held is None)
+            assert 0 <= mishap.right <= mishap.expected <= len(scene.recipe.steps)
+            checked += mishap.right < mishap.expected
+    assert checked > 10
+
+
+def test_states_are_the_same_as_themselves_and_after_nothing_happened():
+    for scene, states, _ in executions(3):
+        poses = [scene.stage.link_poses(state) for state in states]
+        again = indistinguishable([*states, states[0]], [*poses, poses[0]])
+        assert again[0, -1] and again[-1, 0]
+        assert again.diagonal().all()
+        assert not again[0, 1]
+
+
+def test_a_query_needs_a_right_step():
+    with pytest.raises(InvalidInput, match="right"):
+        Route((seen(0),), (Query(seen(1), 0, np.array([False])),))
+
+
+def test_shards_give_back_what_was_written(tmp_path):
+    write_routes([route(0), route(1, steps=2)], tmp_path / "a.npz")
+    shard = RouteShard(tmp_path / "a.npz")
+    assert [len(shard[i].states) for i in range(len(shard))] == [3, 2]
+    for wrote, read in zip((route(0), route(1, steps=2)), (shard[0], shard[1]), strict=True):
+        for a, b in zip(wrote.states, read.states, strict=True):
+            np.testing.assert_allclose(a.cloud.points, b.cloud.points, atol=1e-6)
+            np.testing.assert_array_equal(a.T_world_gripper, b.T_world_gripper)
+            assert a.opening == b.opening
+        for a, b in zip(wrote.queries, read.queries, strict=True):
+            np.testing.assert_allclose(a.seen.cloud.points, b.seen.cloud.points, atol=1e-6)
+            np.testing.assert_array_equal(a.right, b.right)
+            assert a.expected == b.expected
+
+
+def test_shards_of_pairs_and_of_routes_are_not_confused(tmp_path):
+    generate(tmp_path, 2, seed=0, jobs=1, routes=True)
+    (path,) = tmp_path.glob("*.npz")
+    assert len(RouteShard(path)) == 2
+    with pytest.raises(CorruptData, match="another kind"):
+        Shard(path)
+    written = path.stat().st_mtime_ns
+    generate(tmp_path, 2, seed=0, jobs=1, routes=True)
+    assert path.stat().st_mtime_ns == written
+
+
+def test_tensors_of_a_whole_route():
+    sample = make_route_sample(route(), GRAPH)
+    assert sample.query.step.tolist() == [0, 1, 2, 3] and sample.shown.step.tolist() == [0, 1, 2]
+    assert sample.right.sum(dim=1).tolist() == [1, 1, 1, 1]
+    assert (make_route_sample(route(), GRAPH, blind=True).query.step == UNKNOWN).all()
+
+
+def test_training_draws_queries_and_makes_expectations_unreliable():
+    samples = [make_route_sample(route(steps=6), GRAPH, np.random.default_rng(s)) for s in range(30)]
+    assert all(len(s.right) == QUERIES for s in samples)
+    off = torch.cat([s.query.step - s.right.float().argmax(dim=1) for s in samples])
+    unknown = torch.cat([s.query.step for s in samples]) == UNKNOWN
+    assert 0.3 < unknown.float().mean() < 0.7
+    assert (off[~unknown] == 0).any() and (off[~unknown] == 1).any()
+
+
+def test_a_batch_keeps_routes_apart():
+    batch = collate_routes([make_route_sample(route(0, 3), GRAPH), make_route_sample(route(1, 2), GRAPH)])
+    assert batch.demonstration.tolist() == [0, 0, 0, 1, 1]
+    assert batch.of.tolist() == [0] * 4 + [1] * 3
+    assert batch.right.shape == (7, 3) and not batch.right[4:, 2].any()
+    assert batch.shown.graph.size == 5 and batch.query.graph.size == 7
