@@ -61,6 +61,17 @@ def test_the_cap_on_region_points():
     assert len(sample(pair(), max_region=5).chosen) == 5
 
 
+def test_without_a_region_the_whole_support_is_matched_and_only_its_region_has_targets():
+    made = make_sample(pair(), SMALL, 60, np.random.default_rng(0), region_first=False)
+    inside = made.region[made.chosen] > 0.5
+    assert len(made.chosen) == 60 and 0 < inside.sum() < 60
+    spread = made.before.points.numpy().max(axis=0) - made.before.points.numpy().min(axis=0)
+    chosen = made.before.points[made.chosen].numpy()
+    assert (np.ptp(chosen, axis=0) > 0.8 * spread).all()
+    (pairs,) = made.targets
+    assert len(pairs) > 0.5 * inside.sum() and inside[pairs[:, 0]].all()
+
+
 def test_the_losses_of_a_batch_train_both_networks():
     batch = collate_samples([sample(pair(0)), sample(pair(1))])
     torch.manual_seed(0)

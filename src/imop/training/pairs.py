@@ -10,7 +10,7 @@ from torch import Tensor
 
 from imop.errors import InvalidInput
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud
+from imop.geometry.cloud import PointCloud, farthest_points
 from imop.geometry.neighbours import nearest
 from imop.networks.graph import Graph, GraphConfig, build_graph, collate, nearest_neighbours
 from imop.networks.region import StepBatch
@@ -72,7 +72,7 @@ class Sample:
         gripper: (2,) float32.
         cross, cross_back: nearest points between s_i and s_i'.
         region: (M,) float32, 1 in the region, of the finest points of `before`.
-        chosen: (R,) int64, the region points that are matched.
+        chosen: (R,) int64, the points that are matched.
         targets: for each right motion (P, 2) int64: index into `chosen`, index into the query's points.
         right: (S, 4, 4) float64, the right motions themselves.
     """
@@ -117,15 +117,26 @@ class PairBatch:
         return PairBatch(self.step.to(device), self.query.to(device), *rest, targets, self.right)
 
 
-def make_sample(pair: StepPair, config: GraphConfig, max_region: int, rng: np.random.Generator) -> Sample:
-    """Graphs and targets of a pair; `rng` chooses which region points are matched if there are too many."""
+def make_sample(
+    pair: StepPair, config: GraphConfig, max_region: int, rng: np.random.Generator, region_first: bool = True
+) -> Sample:
+    """Graphs and targets of a pair.
+
+    Args:
+        pair: the pair.
+        config: how clouds become graphs.
+        max_region: cap on the points that are matched.
+        rng: chooses which points of the region are matched if there are too many.
+        region_first: if False, spread-out points of the whole support state are matched; those that are not
+            of the region have no target.
+    """
     before, after, query = (build_graph(c, config) for c in (pair.support, pair.after, pair.query))
     p_before, p_after = before.points.numpy().astype(np.float64), after.points.numpy().astype(np.float64)
     label = pair.region[nearest(p_before, pair.support.points)[1][:, 0]]
     if not label.any():
         # The region is smaller than the grid: its nearest point stands for it.
         label[nearest(pair.support.points[pair.region], p_before)[1][0, 0]] = True
-    chosen = np.flatnonzero(label)
+    chosen = np.flatnonzero(label) if region_first else np.sort(farthest_points(p_before, max_region))
     if len(chosen) > max_region:
         chosen = np.sort(rng.choice(chosen, max_region, replace=False))
     poses = np.stack([pair.T_world_goal, pair.T_world_now]).astype(np.float32)
@@ -140,22 +151,25 @@ def make_sample(pair: StepPair, config: GraphConfig, max_region: int, rng: np.ra
         torch.from_numpy(nearest_neighbours(p_after, p_before, k)),
         torch.from_numpy(label.astype(np.float32)),
         torch.from_numpy(chosen),
-        match_targets(p_before[chosen], query, pair.T_query_support),
+        match_targets(p_before[chosen], label[chosen], query, pair.T_query_support),
         torch.from_numpy(np.array(pair.T_query_support, dtype=np.float64)),
     )
 
 
-def match_targets(p_region: FloatArray, query: Graph, T_query_support: FloatArray) -> tuple[Tensor, ...]:
-    """For each right motion (S, 4, 4) its pairs (P, 2): region point, query point nearest to where it goes.
+def match_targets(
+    p_chosen: FloatArray, region: BoolArray, query: Graph, T_query_support: FloatArray
+) -> tuple[Tensor, ...]:
+    """For each right motion (S, 4, 4) its pairs (P, 2): chosen point, query point nearest to where it goes.
 
-    Points without a query point nearer than `MATCH_RADIUS` are hidden and have no pair. A motion that hides
-    the whole region is left out, unless all do; then its pairs are empty.
+    Chosen points (R, 3) outside the `region` (R,) have no pair. Nor have hidden ones, without a query point
+    nearer than `MATCH_RADIUS`. A motion that hides the whole region is left out, unless all do; then its
+    pairs are empty.
     """
     p_query = query.points.numpy().astype(np.float64)
     found = []
     for T in T_query_support:
-        distance, index = nearest(se3.apply(T, p_region), p_query)
-        seen = np.flatnonzero(distance[:, 0] < MATCH_RADIUS)
+        distance, index = nearest(se3.apply(T, p_chosen), p_query)
+        seen = np.flatnonzero(region & (distance[:, 0] < MATCH_RADIUS))
         found.append(torch.from_numpy(np.stack([seen, index[seen, 0]], axis=1).astype(np.int64)))
     some = [pairs for pairs in found if len(pairs)]
     return tuple(some or found[:1])

@@ -1,0 +1,41 @@
+"""The paper's ablations: what each row of its table changes in the networks."""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from imop.networks.model import ModelConfig
+
+
+@dataclass(frozen=True)
+class Ablation:
+    """Rows of the paper's table, in its order; the defaults change nothing.
+
+    Attributes:
+        low_dimensional: whether the robot's state is among the inputs.
+        attention: of the matching network; None keeps that of the size.
+        region_first: False matches the whole support state with the query, without a region.
+        neighbours: K of the graphs and of the matching network's; None keeps that of the size.
+        pose: by least squares, by a network from matched points, or by a network without matches.
+    """
+
+    low_dimensional: bool = True
+    attention: Literal["graph", "global"] | None = None
+    region_first: bool = True
+    neighbours: int | None = None
+    pose: Literal["analytic", "from_matches", "regressed"] = "analytic"
+
+    def of(self, config: ModelConfig) -> ModelConfig:
+        """The configuration with the chosen rows instead of its own."""
+        graph, matching = config.graph, replace(config.matching, region_first=self.region_first)
+        if self.attention is not None:
+            matching = replace(matching, attention=self.attention)
+        if self.neighbours is not None:
+            graph = replace(graph, neighbours=self.neighbours)
+            matching = replace(matching, neighbours=self.neighbours)
+        return ModelConfig(
+            graph,
+            replace(config.region, low_dimensional=self.low_dimensional),
+            matching,
+            replace(config.routing, low_dimensional=self.low_dimensional),
+            replace(config.pose, method=self.pose, backbone=matching.backbone, heads=matching.heads),
+        )
