@@ -136,7 +136,7 @@ def test_tensors_of_a_whole_route():
 
 
 def test_training_draws_queries_and_makes_expectations_unreliable():
-    samples = [make_route_sample(route(steps=6), GRAPH, np.random.default_rng(s)) for s in range(30)]
+    samples = [make_route_sample(route(steps=9), GRAPH, np.random.default_rng(s)) for s in range(30)]
     assert all(len(s.right) == QUERIES for s in samples)
     off = torch.cat([s.query.step - s.right.float().argmax(dim=1) for s in samples])
     unknown = torch.cat([s.query.step for s in samples]) == UNKNOWN

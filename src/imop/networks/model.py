@@ -24,7 +24,7 @@ from imop.networks.routing import HAND_FEATURES, RoutingConfig, RoutingNetwork
 VERSION = 1
 CARD = "card.json"
 WEIGHTS = "weights.safetensors"
-NETWORKS = ("region", "matching", "routing")
+NETWORKS = ("region", "matching", "routing", "pose")
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class ModelConfig:
     matching: MatchingConfig = field(default_factory=MatchingConfig)
     routing: RoutingConfig = field(default_factory=RoutingConfig)
     pose: PoseConfig = field(default_factory=PoseConfig)
-    route_graph: GraphConfig = field(default_factory=lambda: GraphConfig(0.02, 0.08, max_points=256))
+    route_graph: GraphConfig = field(default_factory=lambda: GraphConfig(0.02, 0.08, 160, grids=(0.08,)))
 
 
 SMALL = ModelConfig()
@@ -63,6 +63,7 @@ PAPER = ModelConfig(
         layers=4,
         heads=8,
     ),
+    route_graph=GraphConfig(voxel=0.01, plane_voxel=0.04, max_points=2000, grids=(0.03, 0.08), neighbours=16),
 )
 """The paper's size, 80.8 M parameters in all; how they are spread over the networks it does not say."""
 

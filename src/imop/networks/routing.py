@@ -37,7 +37,7 @@ class RoutingConfig:
     """
 
     backbone: BackboneConfig = field(
-        default_factory=lambda: BackboneConfig(POINT_FEATURES + HAND_FEATURES, (32, 48, 96), (1, 1, 1))
+        default_factory=lambda: BackboneConfig(POINT_FEATURES + HAND_FEATURES, (32, 64), (1, 1))
     )
     width: int = 96
     layers: int = 2

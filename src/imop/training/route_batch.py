@@ -12,7 +12,7 @@ from imop.networks.routing import UNKNOWN, States
 from imop.training.augment import seen_differently
 from imop.training.routes import Query, Route, Seen
 
-QUERIES = 5
+QUERIES = 8
 """How many queries of a route make a training sample."""
 
 

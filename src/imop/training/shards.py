@@ -48,6 +48,11 @@ class Shard:
     def __len__(self) -> int:
         return len(self._arrays["pair_clouds"])
 
+    @property
+    def clouds(self) -> NDArray[np.int64]:
+        """(N, 3) numbers of the clouds of each pair: s_i, s_i', s_j; equal numbers are the same cloud."""
+        return self._arrays["pair_clouds"]
+
     def __getitem__(self, index: int) -> StepPair:
         a = self._arrays
         support, after, query = (read_cloud(a, int(c)) for c in a["pair_clouds"][index])
