@@ -1,8 +1,20 @@
+from dataclasses import replace
+
 import numpy as np
 import torch
 
 from imop.geometry import se3
-from imop.networks.graph import POINT_FEATURES, RADII, build_graph, collate, local_statistics, thin
+from imop.geometry.perception import supporting_plane
+from imop.networks.graph import (
+    POINT_FEATURES,
+    RADII,
+    GraphConfig,
+    bare_plane,
+    build_graph,
+    collate,
+    local_statistics,
+    thin,
+)
 from tests.networks.scenes import SMALL, moved, tabletop
 
 
@@ -75,6 +87,26 @@ def test_a_cloud_of_one_point_makes_a_graph():
 def test_the_plane_is_thinned_and_not_deleted():
     cloud = tabletop()
     fine, height = thin(cloud, SMALL)
-    flat, before = np.count_nonzero(np.abs(height) < 0.008), np.count_nonzero(cloud.points[:, 2] < 0.758)
-    assert 0 < flat <= SMALL.max_points / 3 < before
-    assert np.ptp(fine.points[np.abs(height) < 0.008, :2], axis=0).min() > 0.4
+    bare = (np.abs(height) < 0.008) & (np.abs(fine.colors - 0.6) < 0.01).all(axis=1)
+    before = np.count_nonzero(cloud.points[:, 2] < 0.7501)
+    assert 0 < bare.sum() <= SMALL.max_points / 3 < before
+    assert np.ptp(fine.points[bare, :2], axis=0).min() > 0.4
+
+
+def test_a_mark_on_the_plane_keeps_its_points():
+    cloud = tabletop()
+    mark = (np.linalg.norm(cloud.points[:, :2] - (0.2, -0.2), axis=1) < 0.05) & (cloud.points[:, 2] < 0.7501)
+    marked = replace(cloud, colors=np.where(mark[:, None], np.float32([0.9, 0, 0]), cloud.colors))
+    inside = [
+        np.sum(np.linalg.norm(thin(c, GraphConfig())[0].points[:, :2] - (0.2, -0.2), axis=1) < 0.05)
+        for c in (cloud, marked)
+    ]
+    assert inside[1] > 2 * inside[0] > 0
+
+
+def test_a_patterned_plane_has_no_marks():
+    cloud = tabletop()
+    level = cloud.points[:, 2] < 0.7501
+    stripes = level & (np.floor(cloud.points[:, 0] / 0.05) % 2 == 0)
+    patterned = replace(cloud, colors=np.where(stripes[:, None], np.float32([0.1, 0.1, 0.1]), cloud.colors))
+    assert bare_plane(patterned, supporting_plane(patterned))[level].all()

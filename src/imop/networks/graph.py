@@ -15,9 +15,11 @@ from torch import Tensor
 
 from imop.geometry.cloud import PointCloud, concatenate, farthest_points, grid_cells, voxel_downsample
 from imop.geometry.neighbours import nearest
-from imop.geometry.perception import PLANE_THICKNESS, supporting_plane
-from imop.types import FloatArray
+from imop.geometry.perception import PLANE_THICKNESS, Plane, supporting_plane
+from imop.types import BoolArray, FloatArray
 
+# A point of the plane whose colour differs by more is a mark on it, unless less than this share is plain.
+MARKED, PLAIN_SHARE = 0.15, 0.8
 # Statistics of the neighbourhood are taken at these radii, metres.
 RADII = (0.03, 0.07)
 STATISTICS = 9
@@ -125,17 +127,30 @@ def build_graph(cloud: PointCloud, config: GraphConfig) -> Graph:
 
 
 def thin(cloud: PointCloud, config: GraphConfig) -> tuple[PointCloud, FloatArray]:
-    """At most `max_points` of the cloud, few of them on the plane, and their heights (N,) above it."""
+    """At most `max_points` of the cloud, few of them on the bare plane, and their heights (N,) above it."""
     plane = supporting_plane(cloud)
-    height = cloud.points[:, 2] - cloud.points[:, 2].min() if plane is None else plane.height(cloud.points)
-    flat = np.abs(height) < (-1.0 if plane is None else PLANE_THICKNESS)
-    above = voxel_downsample(cloud.select(~flat), config.voxel)
-    ground = voxel_downsample(cloud.select(flat), config.plane_voxel)
+    bare = bare_plane(cloud, plane)
+    above = voxel_downsample(cloud.select(~bare), config.voxel)
+    ground = voxel_downsample(cloud.select(bare), config.plane_voxel)
     # The ground gets at most a third of what there is.
     ground = ground.select(farthest_points(ground.points, config.max_points // 3))
     above = above.select(farthest_points(above.points, config.max_points - len(ground)))
     fine = concatenate([above, ground])
     return fine, fine.points[:, 2] - fine.points[:, 2].min() if plane is None else plane.height(fine.points)
+
+
+def bare_plane(cloud: PointCloud, plane: Plane | None) -> BoolArray:
+    """(N,) True for points of the supporting plane itself, not of things on it nor of marks in its face.
+
+    A mark has another colour than most of the plane; where much has, the plane is patterned and has no marks.
+    """
+    if plane is None:
+        return np.zeros(len(cloud), dtype=bool)
+    flat = np.abs(plane.height(cloud.points)) < PLANE_THICKNESS
+    if not flat.any():
+        return flat
+    plain = np.abs(cloud.colors - np.median(cloud.colors[flat], axis=0)).max(axis=1) < MARKED
+    return flat if np.mean(plain[flat]) < PLAIN_SHARE else flat & plain
 
 
 def local_statistics(points: FloatArray, normals: FloatArray, radius: float) -> FloatArray:

@@ -15,7 +15,8 @@ from torch import Tensor
 
 from imop.geometry import se3
 from imop.geometry.neighbours import nearest, within
-from imop.networks.graph import Graph, build_graph
+from imop.geometry.perception import supporting_plane
+from imop.networks.graph import Graph, bare_plane, build_graph
 from imop.networks.matching import Correspondence, reposition
 from imop.networks.model import Model
 from imop.networks.region import StepBatch, one_step
@@ -94,7 +95,8 @@ class LearnedStep:
         with torch.inference_mode():
             found = model.matching(self._graph, self._chosen, seen, self._described)
         seeds = self._seeds(found, seen)
-        things = self._search.things(query)
+        things = query.cloud.select(~bare_plane(query.cloud, supporting_plane(query.cloud)))
+        things = self._search.without_held(query, things)
         return self._search(query, things, seeds, hints) if len(things) >= 5 else ()
 
     def _seeds(self, found: Correspondence, seen: Graph) -> FloatArray:
@@ -130,6 +132,9 @@ def _dense(
     weight = torch.zeros_like(probability).index_copy(0, chosen, probability[chosen]).double().numpy()
     owner = nearest(cloud.points, graph.points.double().numpy())[1][:, 0]
     member = weight[owner] > 0
+    # The bare table is found everywhere.
+    standing = member & ~bare_plane(cloud, supporting_plane(cloud))
+    member = standing if standing.sum() >= FEWEST else member
     region = cloud.select(member)
     p_held = se3.apply(step.before.observation.T_world_gripper, p_gripper_held)
     if len(p_held) and within(p_held, region.points, SAME).mean() > 0.5:

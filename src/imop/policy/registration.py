@@ -10,7 +10,7 @@ from imop.geometry.cloud import PointCloud, farthest_points, voxel_downsample
 from imop.geometry.features import fpfh
 from imop.policy.hypotheses import mutual_matches, sample_motions
 from imop.policy.matcher import Hypothesis, Scene, Transition
-from imop.policy.objects import connected
+from imop.policy.objects import connected, find_objects
 from imop.policy.region import Region, find_regions
 from imop.policy.search import Search, SearchConfig
 from imop.types import FloatArray
@@ -67,7 +67,7 @@ class RegisteredStep:
 
     def match(self, query: Scene, hints: Sequence[FloatArray] = ()) -> tuple[Hypothesis, ...]:
         """Where the region is in the query, best first; see `PreparedStep.match`."""
-        things = self._search.things(query)
+        things = self._search.without_held(query, find_objects(query.cloud).cloud)
         if len(things) < 5:
             return ()
         seeds = np.concatenate([self._sampled(things), self._upright(things)])

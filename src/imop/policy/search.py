@@ -12,7 +12,6 @@ from imop.policy.contacts import SAME
 from imop.policy.evidence import Judge, Surface
 from imop.policy.hypotheses import distinct
 from imop.policy.matcher import Hypothesis, Scene
-from imop.policy.objects import find_objects
 from imop.policy.refine import FINEST, Refiner, upright
 from imop.policy.region import Region
 from imop.types import FloatArray
@@ -61,9 +60,8 @@ class Search:
         self._coarse = region.cloud.points[farthest_points(region.cloud.points, 400)]
         self._fine = region.cloud.points[farthest_points(region.cloud.points, 1500)]
 
-    def things(self, query: Scene) -> PointCloud:
-        """What of the query may be the region: all that stands on the plane, but for what is in the hand."""
-        cloud = find_objects(query.cloud).cloud
+    def without_held(self, query: Scene, cloud: PointCloud) -> PointCloud:
+        """The part of a query's cloud that is not in the hand, if the region is not what is held."""
         if not len(self._region.p_gripper_held):
             return cloud
         p_held = se3.apply(query.observation.T_world_gripper, self._region.p_gripper_held)
@@ -76,7 +74,7 @@ class Search:
 
         Args:
             query: the observed scene.
-            things: at least 5 points of it, see `things`.
+            things: at least 5 points of it, all that the region may be.
             seeds: (H, 4, 4) motions to begin with.
             hints: motions (4, 4) that are tried in any case.
         """
