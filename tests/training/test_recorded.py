@@ -1,0 +1,123 @@
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from imop.demos.store import DemonstrationStore
+from imop.errors import InvalidInput
+from imop.geometry import se3
+from imop.geometry.neighbours import nearest
+from imop.training.recorded import group_pairs, groups, take, write_recorded
+from imop.training.shards import Shard
+from imop.types import Action, Demonstration, Keyframe
+from tests.demos.scenes import Box, joints_for, observe
+
+DOWN = se3.euler(x=np.pi)
+HOME = se3.make(DOWN, (0.28, 0.0, 1.25))
+BLOCK, PLATE = (0.05, 0.03, 0.04), (0.08, 0.06, 0.01)
+ON_BLOCK, ON_PLATE = (se3.make(DOWN, (0, 0, z)) for z in (0.02, 0.12))
+PLACES = [
+    ((0.30, 0.10, 0.4), (0.10, -0.15, 0.3)),
+    ((0.20, -0.20, 2.0), (0.35, 0.10, 0.2)),
+    ((0.40, 0.00, -1.0), (0.15, 0.20, 1.2)),
+]
+
+
+@cache
+def home_joints():
+    return joints_for(HOME)
+
+
+def at(place, half):
+    return se3.make(se3.euler(z=place[2]), (*place[:2], 0.75 + half[2]))
+
+
+@cache
+def demonstration(number, hidden=False):
+    """Go to the block, then over the plate; the gripper is shown at home all the time."""
+    block, plate = (at(p, half) for p, half in zip(PLACES[number], (BLOCK, PLATE), strict=True))
+    boxes = [Box(block, BLOCK, (200, 40, 40), 10), Box(plate, PLATE, (40, 60, 200), 12)]
+    cover = Box(block @ se3.make(p=(0, 0, 0.1)), (0.12, 0.12, 0.02), (90, 90, 90), 11)
+    seen = [
+        observe([*boxes, cover] if hidden else boxes, HOME, opening, step, wrist=False, q=home_joints())
+        for step, opening in enumerate((1.0, 0.6, 0.6))
+    ]
+    keyframes = (
+        Keyframe(seen[0], Action(block @ ON_BLOCK, False)),
+        Keyframe(seen[1], Action(plate @ ON_PLATE, True)),
+    )
+    return Demonstration(keyframes, seen[2], "test/carry", 0, (), {"instance": 3, "episode": number})
+
+
+@cache
+def takes():
+    return tuple(take(demonstration(number), None) for number in range(3))
+
+
+def test_every_step_gives_a_pair_for_every_two_demonstrations():
+    pairs = group_pairs(takes())
+    assert len(pairs) == 2 * 3 * 2
+    assert sum(p.gripper_open == (True, False) for p in pairs) == 6
+    assert sum(p.gripper_open == (False, True) for p in pairs) == 6
+
+
+def test_regions_are_what_the_actions_are_fixed_to_and_motions_are_true():
+    for pair in group_pairs(takes()):
+        step = int(pair.gripper_open == (False, True))
+        number = next(i for i in range(3) if np.array_equal(takes()[i].goal(step), pair.T_world_goal))
+        half, expected = ((BLOCK, ON_BLOCK), (PLATE, ON_PLATE))[step]
+        thing = at(PLACES[number][step], half)
+        np.testing.assert_allclose(pair.T_world_goal, thing @ expected)
+        inside = np.abs(se3.apply(se3.invert(thing), pair.support.points)) < np.add(half, 0.004)
+        assert not (pair.region & ~inside.all(axis=1)).any()
+        assert (pair.region & inside.all(axis=1)).sum() > 0.8 * inside.all(axis=1).sum()
+        moved = se3.apply(pair.T_query_support[0], pair.support.points[pair.region])
+        # The two cameras see other sides of it.
+        assert np.median(nearest(moved, pair.query.points)[0]) < 0.008
+
+
+def test_an_oblong_thing_has_two_right_motions():
+    pairs = group_pairs(takes())
+    assert {len(p.T_query_support) for p in pairs} == {2}
+
+
+def test_a_step_whose_object_is_hidden_gives_no_pair():
+    hidden = take(demonstration(2, hidden=True), None)
+    pairs = group_pairs([*takes()[:2], hidden])
+    blocked = [p for p in pairs if p.gripper_open == (True, False)]
+    assert len(blocked) == 2 and len(pairs) == 2 + 6
+
+
+def test_one_demonstration_has_no_pair():
+    assert group_pairs(takes()[:1]) == []
+
+
+@pytest.fixture
+def store(tmp_path):
+    made = DemonstrationStore.create(tmp_path / "demos.zarr")
+    for number in range(3):
+        made.append(demonstration(number))
+    other = replace(demonstration(0), variation=1)
+    for d in (other, replace(other, variation=2), replace(other, variation=2, seeds={"instance": 4})):
+        made.append(d)
+    return made
+
+
+def test_groups_have_the_same_task_variation_and_objects(store):
+    assert [sorted(group) for group in groups(store, 0)] == [[0, 1, 2]]
+
+
+def test_shards_are_written_as_training_reads_them(store, tmp_path):
+    assert write_recorded(store.path, tmp_path / "shards", 5, 0) == 5
+    shard = Shard(tmp_path / "shards" / "shard-00000.npz")
+    assert len(shard) == 5 and all(shard[i].region.any() for i in range(5))
+
+
+def test_what_belongs_to_nothing_is_refused(tmp_path):
+    made = DemonstrationStore.create(tmp_path / "demos.zarr")
+    made.append(demonstration(0))
+    with pytest.raises(InvalidInput, match="scenes"):
+        write_recorded(tmp_path / "demos.zarr", tmp_path / "shards", 5, 0)
+    with pytest.raises(InvalidInput, match="instance"):
+        take(demonstration(0).stripped(), None)
