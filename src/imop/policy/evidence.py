@@ -109,15 +109,32 @@ class Surface:
             hidden &= ~(inside & np.isfinite(depth) & (depth > z - self.tolerances.depth))
         return hidden
 
-    def share(self, cloud: PointCloud, weight: FloatArray, T: FloatArray, explained: FloatArray) -> float:
-        """Weighted share 0 .. 1 of the moved `cloud` that is `explained` (M,); hidden points cost less."""
+    def possible(self, cloud: PointCloud, weight: FloatArray, explained: FloatArray) -> FloatArray:
+        """(M,) weights of a `cloud` with normals; hidden points that nothing `explained` (M,) count less."""
         open_points = np.flatnonzero(explained < 0.5)
         doubtful = cloud.select(open_points)
         assert doubtful.normals is not None
-        hidden = self.hides(se3.apply(T, doubtful.points), se3.rotate(T, doubtful.normals))
+        hidden = self.hides(doubtful.points, doubtful.normals)
         possible = weight.copy()
         possible[open_points[hidden]] *= self.tolerances.hidden
+        return possible
+
+    def share(self, cloud: PointCloud, weight: FloatArray, T: FloatArray, explained: FloatArray) -> float:
+        """Weighted share 0 .. 1 of the moved `cloud` that is `explained` (M,); hidden points cost less."""
+        possible = self.possible(moved(cloud, T), weight, explained)
         return float(np.clip((weight * explained).sum() / max(possible.sum(), 1e-9), 0.0, 1.0))
+
+
+def moved(cloud: PointCloud, T: FloatArray) -> PointCloud:
+    """A cloud with normals after a motion (4, 4), or after each of several (H, 4, 4), one after the other."""
+    assert cloud.normals is not None
+    copies = int(np.prod(T.shape[:-2]))
+    return PointCloud(
+        se3.apply(T, cloud.points).reshape(-1, 3),
+        np.tile(cloud.colors, (copies, 1)),
+        np.tile(cloud.camera, copies),
+        se3.rotate(T, cloud.normals).reshape(-1, 3),
+    )
 
 
 class Judge:
@@ -139,10 +156,15 @@ class Judge:
         self._fine, self._fine_weight = region.cloud.select(fine), weight[fine]
         self._around = query.cloud.select(farthest_points(query.cloud.points, 1000))
 
-    def glance(self, T_query_support: FloatArray) -> float:
-        """A quick forward score, 0 .. 1."""
-        explained, _ = self._query.explain(self._coarse, T_query_support)
-        return self._query.share(self._coarse, self._coarse_weight, T_query_support, explained)
+    def glance(self, T_query_support: FloatArray) -> FloatArray:
+        """(H,) quick forward scores, 0 .. 1, of motions (H, 4, 4)."""
+        copies = moved(self._coarse, T_query_support)
+        weight = np.tile(self._coarse_weight, len(T_query_support))
+        explained, _ = self._query.explain(copies, np.eye(4))
+        possible = self._query.possible(copies, weight, explained)
+        got, wanted = ((v.reshape(len(T_query_support), -1)).sum(1) for v in (weight * explained, possible))
+        scores: FloatArray = np.clip(got / np.maximum(wanted, 1e-9), 0.0, 1.0)
+        return scores
 
     def judge(self, T_query_support: FloatArray) -> Hypothesis:
         """The motion as a hypothesis, scored in both directions."""

@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 
 from imop.geometry import se3
+from imop.geometry.cloud import PointCloud, farthest_points
 from imop.geometry.neighbours import nearest, within
 from imop.geometry.perception import supporting_plane
 from imop.networks.graph import Graph, bare_plane, build_graph
@@ -23,9 +24,9 @@ from imop.networks.region import StepBatch, one_step
 from imop.policy.contacts import SAME, find_contacts, is_open
 from imop.policy.hypotheses import sample_motions
 from imop.policy.matcher import Hypothesis, Scene, Transition
-from imop.policy.objects import find_objects
+from imop.policy.objects import connected, find_objects
 from imop.policy.region import Region
-from imop.policy.search import Search, SearchConfig
+from imop.policy.search import Search, SearchConfig, middle, upright_motions
 from imop.types import FloatArray
 
 # A region of fewer points cannot be matched.
@@ -41,6 +42,8 @@ class LearnedMatcher:
         threshold: least probability of a region point.
         candidates: query points per region point that may be matched.
         samples: triples drawn from the matches.
+        places: things of the query on which the region is set upright, too.
+        turns: how often, over a full turn.
         search: how the motions are refined and judged.
         seed: of the sampling.
     """
@@ -49,6 +52,8 @@ class LearnedMatcher:
     threshold: float = 0.5
     candidates: int = 2
     samples: int = 4000
+    places: int = 2
+    turns: int = 24
     search: SearchConfig = field(default_factory=lambda: SearchConfig(refined=5, finished=2))
     seed: int = 0
 
@@ -69,16 +74,17 @@ class LearnedStep:
             logits = model.region(_batch(step, before, after, model.config.graph.neighbours))[-1]
             self._described = model.matching.backbone(before)
         probability = torch.sigmoid(logits)
-        self._graph, self._chosen = before, self._choose(probability)
+        inside = self._inside(probability)
+        self._region = _dense(step, before, probability, inside, p_gripper_held)
+        few = farthest_points(before.points[inside].double().numpy(), model.config.matching.max_region)
+        self._graph, self._chosen = before, inside[torch.from_numpy(few).sort().values]
         self._probability = probability[self._chosen].double().numpy()
-        self._region = _dense(step, before, probability, self._chosen, p_gripper_held)
         self._search = Search(matcher.search, step.before, self._region)
 
-    def _choose(self, probability: Tensor) -> Tensor:
-        """(R,) the likeliest points, in order of their index."""
+    def _inside(self, probability: Tensor) -> Tensor:
+        """(R,) points of the region, in order of their index; the likeliest few if there seems to be none."""
         count = int((probability > self._matcher.threshold).sum())
-        most = self._matcher.model.config.matching.max_region
-        count = min(max(count, FEWEST), most, len(probability))
+        count = min(max(count, FEWEST), len(probability))
         return probability.topk(count).indices.sort().values
 
     @property
@@ -94,23 +100,56 @@ class LearnedStep:
         seen = build_graph(query.cloud, model.config.graph)
         with torch.inference_mode():
             found = model.matching(self._graph, self._chosen, seen, self._described)
-        seeds = self._seeds(found, seen)
         things = query.cloud.select(~bare_plane(query.cloud, supporting_plane(query.cloud)))
         things = self._search.without_held(query, things)
-        return self._search(query, things, seeds, hints) if len(things) >= 5 else ()
+        if len(things) < 5:
+            return ()
+        matches = self._matches(found, seen)
+        fit = reposition(found.last, found.p_region, found.p_query).double().numpy()
+        seeds = np.concatenate([fit, self._sampled(matches), self._upright(matches, things)])
+        return self._search(query, things, seeds, hints)
 
-    def _seeds(self, found: Correspondence, seen: Graph) -> FloatArray:
-        """(H, 4, 4): the paper's least squares over all matches, and motions that some matches agree on."""
-        everything = reposition(found.last, found.p_region, found.p_query).double().numpy()
+    def _matches(self, found: Correspondence, seen: Graph) -> "_Matches":
+        """The likeliest query points of every region point."""
         weight, best = found.last[0].topk(min(self._matcher.candidates, len(seen.points)), dim=1)
-        w = weight.double().numpy() * self._probability[:, None]
-        i = np.repeat(np.arange(len(w)), w.shape[1])
-        x, n_x = (t[self._chosen].double().numpy()[i] for t in _surface(self._graph))
+        i = torch.arange(len(weight)).repeat_interleave(weight.shape[1])
+        x, n_x = (t[self._chosen][i].double().numpy() for t in _surface(self._graph))
         y, n_y = (t[best.flatten()].double().numpy() for t in _surface(seen))
-        sampled = sample_motions(
-            x, y, n_x, n_y, w.flatten() + 1e-6, samples=self._matcher.samples, seed=self._matcher.seed
-        )
-        return np.concatenate([everything, sampled])
+        return _Matches(x, n_x, y, n_y, weight.flatten().double().numpy() * self._probability[i] + 1e-6)
+
+    def _sampled(self, m: "_Matches") -> FloatArray:
+        """(H, 4, 4) motions that some matches agree on."""
+        samples, seed = self._matcher.samples, self._matcher.seed
+        return sample_motions(m.x, m.y, m.n_x, m.n_y, m.weight, samples=samples, seed=seed)
+
+    def _upright(self, m: "_Matches", things: PointCloud) -> FloatArray:
+        """(H, 4, 4) motions, in every turn, to the things that most of the region was matched to.
+
+        Where something is, the matches say long before they say how it is turned.
+        """
+        labels = connected(things.points)
+        thing = labels[nearest(m.y, things.points)[1][:, 0]]
+        weights = np.bincount(thing, weights=m.weight, minlength=labels.max() + 1)
+        seeds = []
+        for label in np.argsort(-weights)[: self._matcher.places]:
+            w = m.weight * (thing == label)
+            if w.sum() > 0.1 * m.weight.sum():
+                x, y = (np.average(points, axis=0, weights=w) for points in (m.x, m.y))
+                seeds.append(upright_motions(x, y[None], self._matcher.turns))
+                place = middle(things.points[labels == label])
+                seeds.append(upright_motions(middle(self.region), place[None], self._matcher.turns))
+        return np.concatenate(seeds)
+
+
+@dataclass(frozen=True, eq=False)
+class _Matches:
+    """(K, 3) points and normals of the region and of the query, and how likely they belong together."""
+
+    x: FloatArray
+    n_x: FloatArray
+    y: FloatArray
+    n_y: FloatArray
+    weight: FloatArray
 
 
 def _surface(graph: Graph) -> tuple[Tensor, Tensor]:
@@ -125,11 +164,11 @@ def _batch(step: Transition, before: Graph, after: Graph, neighbours: int) -> St
 
 
 def _dense(
-    step: Transition, graph: Graph, probability: Tensor, chosen: Tensor, p_gripper_held: FloatArray
+    step: Transition, graph: Graph, probability: Tensor, inside: Tensor, p_gripper_held: FloatArray
 ) -> Region:
     """The region on the full cloud: every point belongs as much as the nearest point of the graph does."""
     cloud = step.before.cloud
-    weight = torch.zeros_like(probability).index_copy(0, chosen, probability[chosen]).double().numpy()
+    weight = torch.zeros_like(probability).index_copy(0, inside, probability[inside]).double().numpy()
     owner = nearest(cloud.points, graph.points.double().numpy())[1][:, 0]
     member = weight[owner] > 0
     # The bare table is found everywhere.

@@ -1,18 +1,17 @@
 """The matcher without learning: descriptors, sampled motions, upright seeds, closest points."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, farthest_points, voxel_downsample
 from imop.geometry.features import fpfh
 from imop.policy.hypotheses import mutual_matches, sample_motions
 from imop.policy.matcher import Hypothesis, Scene, Transition
 from imop.policy.objects import connected, find_objects
 from imop.policy.region import Region, find_regions
-from imop.policy.search import Search, SearchConfig
+from imop.policy.search import Search, SearchConfig, middle, upright_motions
 from imop.types import FloatArray
 
 
@@ -85,19 +84,5 @@ class RegisteredStep:
     def _upright(self, things: PointCloud) -> FloatArray:
         """(H, 4, 4) motions that set the region on the place of every object of the query, in every turn."""
         labels = connected(things.points)
-        places = [_middle(things.points[labels == label]) for label in range(labels.max() + 1)]
-        turns = np.linspace(0.0, 2 * np.pi, self._matcher.turns, endpoint=False)
-        return np.stack(list(_about(_middle(self.region), places, turns)))
-
-
-def _middle(points: FloatArray) -> FloatArray:
-    """Centre of the bounding box: which side was seen shifts it less than the mean."""
-    middle: FloatArray = (points.min(axis=0) + points.max(axis=0)) / 2
-    return middle
-
-
-def _about(center: FloatArray, places: Iterable[FloatArray], turns: FloatArray) -> Iterable[FloatArray]:
-    for place in places:
-        for turn in turns:
-            R = se3.euler(z=float(turn))
-            yield se3.make(R, place - R @ center)
+        places = [middle(things.points[labels == label]) for label in range(labels.max() + 1)]
+        return upright_motions(middle(self.region), np.stack(places), self._matcher.turns)

@@ -81,7 +81,7 @@ class Search:
         judge = Judge(self._surface, self._region.weight, Surface(things, query.observation.views))
         T_repeated = query.observation.T_world_gripper @ se3.invert(self._T_world_gripper)
         likely = np.stack([*hints, np.eye(4), T_repeated])
-        order = np.argsort([-judge.glance(T) for T in seeds], kind="stable")
+        order = np.argsort(-judge.glance(seeds), kind="stable")
         chosen = distinct(seeds[order], self._center, keep=self._config.refined)
         motions = self._refined(things, judge, likely, seeds[order[chosen]])
         preference = [self._preference(hypothesis, T_repeated, bool(hints)) for hypothesis in motions]
@@ -118,3 +118,16 @@ class Search:
         p_moved, p_repeated = se3.apply(np.stack([T, T_repeated]), self._center[None])[:, 0]
         away = min(float(np.linalg.norm(p_moved - p_repeated)) / ELSEWHERE, 1.0) if begun else 0.0
         return hypothesis.score * (1 - cost.turn * turn - cost.tilt * tilt - cost.change * away)
+
+
+def upright_motions(center: FloatArray, places: FloatArray, turns: int) -> FloatArray:
+    """(P * turns, 4, 4) motions that carry `center` (3,) to places (P, 3), in all turns about the vertical."""
+    yaw = np.linspace(0.0, 2 * np.pi, turns, endpoint=False)
+    R = np.tile(np.stack([se3.euler(z=float(angle)) for angle in yaw]), (len(places), 1, 1))
+    return se3.make(R, np.repeat(places, turns, axis=0) - R @ center)
+
+
+def middle(points: FloatArray) -> FloatArray:
+    """Centre of the bounding box: which side was seen shifts it less than the mean."""
+    center: FloatArray = (points.min(axis=0) + points.max(axis=0)) / 2
+    return center
