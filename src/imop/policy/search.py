@@ -121,7 +121,7 @@ class Search:
 
 
 def upright_motions(center: FloatArray, places: FloatArray, turns: int) -> FloatArray:
-    """(P * turns, 4, 4) motions that carry `center` (3,) to places (P, 3), in all turns about the vertical."""
+    """(P * turns, 4, 4) motions that carry `center` (3,) to places (P, 3), in all upright turns."""
     yaw = np.linspace(0.0, 2 * np.pi, turns, endpoint=False)
     R = np.tile(np.stack([se3.euler(z=float(angle)) for angle in yaw]), (len(places), 1, 1))
     return se3.make(R, np.repeat(places, turns, axis=0) - R @ center)

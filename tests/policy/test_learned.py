@@ -1,0 +1,76 @@
+"""The learned matcher with networks that know nothing: what holds whatever the weights are."""
+
+import numpy as np
+import pytest
+import torch
+
+from imop.geometry import se3
+from imop.networks.backbone import BackboneConfig
+from imop.networks.graph import POINT_FEATURES, GraphConfig
+from imop.networks.matching import MatchingConfig
+from imop.networks.model import Model, ModelConfig
+from imop.networks.region import GRIPPER_FEATURES, RegionConfig
+from imop.policy.learned import LearnedMatcher
+from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, moved, scene, transitions
+
+HOME = above(0.0, -0.3, 1.2)
+GRASP = above(0.1, 0.1, TABLE + 0.05)
+SIZE = (0.1, 0.05, 0.06)
+TINY = ModelConfig(
+    graph=GraphConfig(max_points=200),
+    region=RegionConfig(BackboneConfig(POINT_FEATURES + GRIPPER_FEATURES, (16, 16, 16)), stages=1),
+    matching=MatchingConfig(BackboneConfig(widths=(16, 16, 16)), layers=1, max_region=60),
+)
+
+
+@pytest.fixture(scope="module")
+def matcher():
+    torch.manual_seed(0)
+    return LearnedMatcher(Model(TINY).eval())
+
+
+def steps(T=None, size=SIZE):
+    T = np.eye(4) if T is None else T
+    scenes = [scene([moved(box(size, RED, at(0.1, 0.1)), T)], T @ pose) for pose in (HOME, GRASP)]
+    return transitions(scenes, [(T @ GRASP, False)])
+
+
+def test_the_region_is_part_of_the_demonstrated_scene(matcher):
+    before = steps()[0].before.cloud.points
+    region = matcher.prepare(steps())[0].region
+    assert 0 < len(region) < len(before)
+    assert all((point == before).all(axis=1).any() for point in region[::50])
+
+
+def test_the_region_moves_with_the_scene(matcher):
+    T = at(0.05, -0.08, 0.0, yaw=0.4)
+    here, there = (matcher.prepare(steps(M))[0].region for M in (np.eye(4), T))
+    # The thinning grid does not turn with the scene, so that single points may come and go.
+    distance = np.linalg.norm(se3.apply(T, here)[::20, None] - there[None], axis=-1).min(axis=1)
+    assert np.mean(distance < 0.02) > 0.8
+
+
+def test_an_unchanged_scene_is_recognised(matcher):
+    step = matcher.prepare(steps())[0]
+    best = step.match(steps()[0].before)[0]
+    assert se3.translation_distance(best.T_query_support @ GRASP, GRASP) < 0.005
+    assert se3.rotation_distance(best.T_query_support, np.eye(4)) < 0.05
+
+
+def test_a_hint_is_tried(matcher):
+    T = at(0.3, -0.2, yaw=1.2) @ se3.invert(at(0.1, 0.1))
+    query = scene([moved(box(SIZE, RED, at(0.1, 0.1)), T)], HOME)
+    best = matcher.prepare(steps())[0].match(query, [T])
+    assert max(h.score for h in best) > 0.5
+
+
+def test_the_same_question_has_the_same_answer(matcher):
+    query = scene([box(SIZE, RED, at(0.3, -0.2)), box(SIZE, BLUE, at(0.0, 0.2))], HOME)
+    first, second = (matcher.prepare(steps())[0].match(query) for _ in range(2))
+    assert np.array_equal(first[0].T_query_support, second[0].T_query_support)
+
+
+def test_a_query_without_points_gives_no_hypothesis(matcher):
+    query = scene([], HOME)
+    empty = type(query)(query.observation, query.cloud.select(np.arange(0)))
+    assert matcher.prepare(steps())[0].match(empty) == ()
