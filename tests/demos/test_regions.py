@@ -9,6 +9,7 @@ from imop.demos.regions import (
     MARGIN,
     REACH,
     SegmentedState,
+    by_aim,
     displacements,
     invariant_region,
     segmented,
@@ -141,3 +142,15 @@ def test_without_partners_or_segmentation_there_is_no_region():
         invariant_region(state, [])
     with pytest.raises(InvalidInput, match="instance"):
         segmented(lift_a_cube().stripped().keyframes[0])
+
+
+def test_demonstrations_belong_together_by_task_variation_and_objects():
+    one = lift_a_cube()
+    shown = [one, replace(one, variation=0), replace(one, seeds={"instance": 8}), one, replace(one, seeds={})]
+    found = by_aim(shown)
+    assert found == {
+        ("test/lift", 2, 7): [0, 3],
+        ("test/lift", 0, 7): [1],
+        ("test/lift", 2, 8): [2],
+        ("test/lift", 2, -1): [4],
+    }

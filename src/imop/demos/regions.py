@@ -4,7 +4,8 @@ A segment (what moves rigidly together) belongs to the region if, seen from the 
 it, it lies where it lies in the other demonstrations of the same step.
 """
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,10 @@ from imop.errors import InvalidInput
 from imop.geometry import cloud as clouds
 from imop.geometry import se3
 from imop.geometry.perception import WORKSPACE_LOWER, WORKSPACE_UPPER
-from imop.types import FloatArray, Keyframe
+from imop.types import Demonstration, FloatArray, Keyframe
+
+Aim = tuple[str, int, int]
+"""Task, variation, and seed of the objects."""
 
 BACKGROUND = ("floor", "wall", "table", "panda")
 """Instances that are never a region: the robot itself, and what stands still whatever is done."""
@@ -58,6 +62,14 @@ class Region:
 
     names: tuple[str, ...]
     displacement: dict[str, float]
+
+
+def by_aim(demonstrations: Iterable[Demonstration]) -> dict[Aim, list[int]]:
+    """Which of the demonstrations show the same task, variation and objects (-1 if nobody says which)."""
+    found: dict[Aim, list[int]] = defaultdict(list)
+    for number, d in enumerate(demonstrations):
+        found[d.task, d.variation, d.seeds.get("instance", -1)].append(number)
+    return found
 
 
 def segmented(keyframe: Keyframe, background: Sequence[str] = BACKGROUND) -> SegmentedState:

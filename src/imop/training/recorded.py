@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from imop.demos.regions import SegmentedState, invariant_region, segmented
+from imop.demos.regions import SegmentedState, by_aim, invariant_region, segmented
 from imop.demos.store import DemonstrationStore
 from imop.errors import InvalidInput
 from imop.geometry.cloud import PointCloud
@@ -93,14 +93,14 @@ def group_pairs(takes: Sequence[Take]) -> list[StepPair]:
     for step in range(steps):
         scenes = {id(t): Scene(t.full[step], t.observation(step)) for t in takes}
         for support in takes:
-            partners = [t for t in takes if t is not support]
-            if not partners:
+            others = [t for t in takes if t is not support]
+            if not others:
                 return []
-            region = invariant_region(support.segments[step], [t.segments[step] for t in partners])
+            region = invariant_region(support.segments[step], [t.segments[step] for t in others])
             if not region.names or region.displacement[region.names[0]] > INVARIANT:
                 continue
             surface = Surface.pooled((t.part(step, region.names), t.goal(step)) for t in takes)
-            for query in partners:
+            for query in others:
                 pair = _pair(support, query, step, region.names, surface, scenes[id(query)])
                 if pair is not None:
                     found.append(pair)
@@ -130,14 +130,8 @@ def _pair(
 
 
 def groups(store: DemonstrationStore, seed: int) -> list[list[int]]:
-    """Numbers of demonstrations that show the same: task, variation and objects (where they are told).
-
-    The order is random, with the tasks in turn.
-    """
-    same: dict[tuple[str, int, int], list[int]] = defaultdict(list)
-    for number, demonstration in enumerate(store):
-        instance = demonstration.seeds.get("instance", -1)
-        same[demonstration.task, demonstration.variation, instance].append(number)
+    """Numbers of demonstrations that show the same, in random order, with the tasks in turn."""
+    same = by_aim(store)
     rng = np.random.default_rng(seed)
     by_task: dict[str, list[list[int]]] = defaultdict(list)
     keys = list(same)
