@@ -1,9 +1,11 @@
 """The paper's ablations: what each row of its table changes in the networks."""
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from imop.networks.model import ModelConfig
+if TYPE_CHECKING:
+    # The command line shows these switches without waiting for torch.
+    from imop.networks.model import ModelConfig
 
 
 @dataclass(frozen=True)
@@ -24,18 +26,20 @@ class Ablation:
     neighbours: int | None = None
     pose: Literal["analytic", "from_matches", "regressed"] = "analytic"
 
-    def of(self, config: ModelConfig) -> ModelConfig:
+    def of(self, config: "ModelConfig") -> "ModelConfig":
         """The configuration with the chosen rows instead of its own."""
-        graph, matching = config.graph, replace(config.matching, region_first=self.region_first)
-        if self.attention is not None:
-            matching = replace(matching, attention=self.attention)
-        if self.neighbours is not None:
-            graph = replace(graph, neighbours=self.neighbours)
-            matching = replace(matching, neighbours=self.neighbours)
-        return ModelConfig(
-            graph,
-            replace(config.region, low_dimensional=self.low_dimensional),
-            matching,
-            replace(config.routing, low_dimensional=self.low_dimensional),
-            replace(config.pose, method=self.pose, backbone=matching.backbone, heads=matching.heads),
+        k, attention = self.neighbours, self.attention or config.matching.attention
+        matching = replace(config.matching, attention=attention, region_first=self.region_first)
+        graph, route_graph = config.graph, config.route_graph
+        if k is not None:
+            graph, route_graph = replace(graph, neighbours=k), replace(route_graph, neighbours=k)
+            matching = replace(matching, neighbours=k)
+        return replace(
+            config,
+            graph=graph,
+            region=replace(config.region, low_dimensional=self.low_dimensional),
+            matching=matching,
+            routing=replace(config.routing, low_dimensional=self.low_dimensional),
+            pose=replace(config.pose, method=self.pose, backbone=matching.backbone, heads=matching.heads),
+            route_graph=route_graph,
         )

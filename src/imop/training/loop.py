@@ -8,117 +8,33 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import repeat
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import torch
 import tyro
 from lightning_fabric import Fabric
+from rich.console import Console
 from torch import Tensor, nn
-from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
+from torch.optim.swa_utils import AveragedModel
 from torch.utils.tensorboard import SummaryWriter
 
 from imop.errors import CorruptData, InvalidInput
 from imop.files import replaced
 from imop.networks.model import NETWORKS, Model, ModelConfig, save_model
-from imop.training import losses
+from imop.training.config import TrainConfig
 from imop.training.data import PairDataset, RouteDataset, loader
 from imop.training.metrics import validate, validate_routes
+from imop.training.objective import Objective
 from imop.training.pairs import PairBatch
+from imop.training.progress import TrainingProgress
 from imop.training.route_batch import RouteBatch
 
 CHECKPOINT = "checkpoint.pt"
 LOG = "log.jsonl"
 
-Network = Literal["region", "matching", "routing"]
 Batch = tuple[PairBatch | None, RouteBatch | None]
-
-
-@dataclass(frozen=True)
-class TrainConfig:
-    """How to train.
-
-    Attributes:
-        out: folder of the checkpoint, the weights and the log.
-        train: folders of shards of pairs to train region and matching on, equally often.
-        validate: folders of shards to validate them on, each reported by its name.
-        routes: folders of shards of routes to train routing on, equally often.
-        validate_routes: folders of shards to validate it on, each reported by its name.
-        networks: which are trained; the others stay as they are at the beginning.
-        steps: optimizer steps in all.
-        batch: pairs, and routes, per step and process.
-        learning_rate: at its peak.
-        warm_up: steps until the peak; a cosine to 1 % follows.
-        weight_decay: of AdamW.
-        clip: largest norm of the gradient.
-        ema: decay of the averaged weights, which are the ones that are saved and validated.
-        every: steps between validations and checkpoints.
-        validation_pairs: how many pairs, or routes, of each folder.
-        seed: of weights, data and augmentation.
-        workers: processes that prepare samples.
-        mixed: whether products within the networks are made in bfloat16; sums and places stay in float32.
-    """
-
-    out: Path
-    train: tuple[Path, ...] = ()
-    validate: tuple[Path, ...] = ()
-    routes: tuple[Path, ...] = ()
-    validate_routes: tuple[Path, ...] = ()
-    networks: tuple[Network, ...] = ("region", "matching")
-    steps: int = 20_000
-    batch: int = 8
-    learning_rate: float = 1e-3
-    warm_up: int = 300
-    weight_decay: float = 0.01
-    clip: float = 5.0
-    ema: float = 0.998
-    every: int = 500
-    validation_pairs: int = 200
-    seed: int = 0
-    workers: int = 1
-    mixed: bool = True
-
-
-class PairLoss(nn.Module):
-    """Batch of pairs -> losses of the region and matching networks, as far as they are trained."""
-
-    def __init__(self, model: Model, networks: tuple[Network, ...]):
-        super().__init__()
-        self.region = model.region if "region" in networks else None
-        self.matching = model.matching if "matching" in networks else None
-
-    def forward(self, batch: PairBatch) -> dict[str, Tensor]:
-        """The region's focal and Dice losses over all stages, and the matching's over all layers."""
-        before = batch.step.before
-        parts: dict[str, Tensor] = {}
-        if self.region is not None:
-            stages = self.region(batch.step)
-            focal = [losses.focal(stage, batch.region, before.cloud, before.size) for stage in stages]
-            dice = [losses.dice(stage, batch.region, before.cloud, before.size) for stage in stages]
-            parts |= {"focal": torch.stack(focal).sum(), "dice": torch.stack(dice).sum()}
-        if self.matching is not None:
-            found = self.matching(before, batch.chosen, batch.query)
-            parts["matching"] = losses.matching(found.layers, batch.targets)
-        return parts
-
-
-class Objective(nn.Module):
-    """Batches -> losses of all networks that are trained, one module that can be distributed."""
-
-    def __init__(self, model: Model, networks: tuple[Network, ...]):
-        super().__init__()
-        self.pairs = PairLoss(model, networks)
-        self.routing = model.routing if "routing" in networks else None
-
-    def forward(self, pairs: PairBatch | None, routes: RouteBatch | None) -> dict[str, Tensor]:
-        """Losses by name."""
-        parts = {} if pairs is None else self.pairs(pairs)
-        if routes is not None and self.routing is not None:
-            scores, _ = self.routing(routes.shown, routes.demonstration, routes.query, routes.of)
-            parts["routing"] = losses.routing(scores, routes.right)
-        return parts
 
 
 class TrainState:
@@ -170,7 +86,10 @@ class TrainState:
 
 
 def train(
-    config: TrainConfig, model_config: ModelConfig | None = None, stop_at: int | None = None
+    config: TrainConfig,
+    model_config: ModelConfig | None = None,
+    stop_at: int | None = None,
+    console: Console | None = None,
 ) -> list[dict[str, float]]:
     """Train from the checkpoint in `config.out`, or from the beginning.
 
@@ -178,34 +97,39 @@ def train(
         config: how.
         model_config: shape of the networks; `small` if None.
         stop_at: stop after this step, with a checkpoint.
+        console: for a line per report and, on a terminal, the progress; standard output if None.
 
     Returns:
         The losses of every step taken.
 
     Raises:
         CorruptData: if shards or the checkpoint cannot be read.
-        InvalidInput: if there is nothing to train on.
+        InvalidInput: if there is nothing to train on, or the networks do not go together.
     """
-    _check(config)
+    shape = model_config or ModelConfig()
+    _check(config, shape)
     fabric = Fabric()
     fabric.launch()
     torch.manual_seed(config.seed)
-    state = TrainState(Model(model_config or ModelConfig()), config)
+    state = TrainState(Model(shape), config)
     state.load(config.out / CHECKPOINT)
     module, optimizer = fabric.setup(Objective(state.model, config.networks), state.optimizer)
     state.average.to(fabric.device)
     last = min(config.steps, stop_at or config.steps)
+    out = (console or Console()) if fabric.is_global_zero else Console(quiet=True)
     history = []
-    for batch in _batches(config, state, last, fabric.world_size, fabric.global_rank):
-        history.append(_step(fabric, module, optimizer, batch, config, state))
-        if state.step % config.every == 0 or state.step == last:
-            if fabric.is_global_zero:
-                _report(config, state, history[-config.every :])
-            fabric.barrier()
+    with TrainingProgress(out, state.step, last) as progress:
+        for batch in _batches(config, state, last, fabric.world_size, fabric.global_rank):
+            history.append(_step(fabric, module, optimizer, batch, config, state))
+            progress.step(history[-1])
+            if state.step % config.every == 0 or state.step == last:
+                if fabric.is_global_zero:
+                    progress.report(_report(config, state, history[-config.every :]))
+                fabric.barrier()
     return history
 
 
-def _check(config: TrainConfig) -> None:
+def _check(config: TrainConfig, shape: ModelConfig) -> None:
     pairs, routes = set(config.networks) - {"routing"}, "routing" in config.networks
     if not config.networks:
         raise InvalidInput("networks", "none", f"some of {', '.join(NETWORKS)}")
@@ -213,6 +137,12 @@ def _check(config: TrainConfig) -> None:
         if needed != bool(getattr(config, name)):
             has = "no folder" if needed else "a folder"
             raise InvalidInput(name, f"{has} for {', '.join(config.networks)}", "shards of what is trained")
+    wanted = {"analytic": set(), "from_matches": {"matching", "pose"}, "regressed": {"pose"}}[
+        shape.pose.method
+    ]
+    if pairs and not (wanted <= pairs and ("pose" in pairs) == ("pose" in wanted)):
+        accepted = f"{' and '.join(sorted(wanted)) or 'no pose'} where the pose is {shape.pose.method}"
+        raise InvalidInput("networks", ", ".join(config.networks), accepted)
 
 
 def _batches(config: TrainConfig, state: TrainState, last: int, world: int, rank: int) -> Iterator[Batch]:
@@ -264,8 +194,8 @@ def schedule(step: int, warm_up: int, steps: int) -> float:
     return 0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * progress))
 
 
-def _report(config: TrainConfig, state: TrainState, recent: list[dict[str, float]]) -> None:
-    """Validate, log, and write checkpoint and weights."""
+def _report(config: TrainConfig, state: TrainState, recent: list[dict[str, float]]) -> str:
+    """Validate, log, and write checkpoint and weights; returns a line for people."""
     means = {name: sum(r[name] for r in recent) / len(recent) for name in recent[0]}
     average = state.average.module
     assert isinstance(average, Model)
@@ -286,12 +216,17 @@ def _report(config: TrainConfig, state: TrainState, recent: list[dict[str, float
     card = {"step": state.step, "seed": config.seed, "losses": means, "validation": found}
     save_model(average, config.out, card)
     numbers = {**means, **{f"{f} {n}": v for f, metrics in found.items() for n, v in metrics.items()}}
-    print(f"step {state.step}: " + ", ".join(f"{n} {v:.3f}" for n, v in numbers.items()), flush=True)
+    return f"step {state.step}: " + ", ".join(f"{n} {v:.3f}" for n, v in numbers.items())
 
 
 def _moving_average(decay: float) -> Callable[..., None]:
-    average: Callable[..., None] = get_ema_multi_avg_fn(decay)  # type: ignore[no-untyped-call]
-    return average
+    def update(average: list[Tensor], weights: list[Tensor], count: Tensor) -> None:
+        # The first steps would otherwise weigh as much as the last.
+        keep = min(decay, (1 + float(count)) / (10 + float(count)))
+        for mean, new in zip(average, weights, strict=True):
+            mean.lerp_(new, 1 - keep)
+
+    return update
 
 
 def main() -> None:

@@ -7,9 +7,9 @@ import torch
 from torch import Tensor
 
 from imop.geometry import se3
-from imop.networks.matching import reposition
 from imop.networks.model import Model
 from imop.training.data import PairDataset, RouteDataset, loader
+from imop.training.objective import predicted_poses, right_poses
 from imop.training.pairs import PairBatch
 from imop.training.route_batch import RouteBatch
 from imop.types import FloatArray
@@ -22,8 +22,8 @@ def validate(model: Model, folder: Path, count: int) -> dict[str, float]:
 
     Returns:
         region_iou: intersection over union at 0.5. match: share of visible region points whose best match is
-        at most 2 cm from the true one. within_2cm_10deg, within_1cm_5deg: share of pairs whose least-squares
-        motion puts the gripper that near to where one of the right motions puts it.
+        at most 2 cm from the true one. within_2cm_10deg, within_1cm_5deg: share of pairs whose predicted
+        pose is that near to one of the right ones.
     """
     dataset = PairDataset([folder], model.config, seed=0, augmented=False)
     numbers = range(min(count, len(dataset)))
@@ -74,7 +74,7 @@ def _measure(model: Model, batch: PairBatch) -> dict[str, list[float]]:
     before = batch.step.before
     inside = model.region(batch.step)[-1] > 0
     found = model.matching(before, batch.chosen, batch.query)
-    T = reposition(found.last, found.p_region, found.p_query).double().numpy()
+    T = predicted_poses(model, batch, found).double().numpy()
     best = found.last.argmax(dim=2)
     measured: dict[str, list[float]] = {"region_iou": [], "match": []}
     for b, motions in enumerate(batch.targets):
@@ -90,12 +90,9 @@ def _measure(model: Model, batch: PairBatch) -> dict[str, list[float]]:
                 if len(pairs)
             ]
             measured["match"].append(max(float(hit.float().mean()) for hit in near))
-    goals = batch.step.T_world_goal.double().numpy()
+    right = [goals.numpy() for goals in right_poses(batch)]
     for name, distance, angle in (("within_1cm_5deg", 0.01, 5.0), ("within_2cm_10deg", 0.02, 10.0)):
-        measured[name] = [
-            float(_near(T[b] @ goals[b], batch.right[b].numpy() @ goals[b], distance, np.radians(angle)))
-            for b in range(len(T))
-        ]
+        measured[name] = [float(_near(T[b], right[b], distance, np.radians(angle))) for b in range(len(T))]
     return measured
 
 

@@ -1,0 +1,52 @@
+"""How to train, apart from the loop so that the command line can show it without waiting for torch."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+Network = Literal["region", "matching", "routing", "pose"]
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """How to train.
+
+    Attributes:
+        out: folder of the checkpoint, the weights and the log.
+        train: folders of shards of pairs to train region and matching on, equally often.
+        validate: folders of shards to validate them on, each reported by its name.
+        routes: folders of shards of routes to train routing on, equally often.
+        validate_routes: folders of shards to validate it on, each reported by its name.
+        networks: which are trained; the others stay as they are at the beginning.
+        steps: optimizer steps in all.
+        batch: pairs, and routes, per step and process.
+        learning_rate: at its peak.
+        warm_up: steps until the peak; a cosine to 1 % follows.
+        weight_decay: of AdamW.
+        clip: largest norm of the gradient.
+        ema: decay of the averaged weights, which are the ones that are saved and validated.
+        every: steps between validations and checkpoints.
+        validation_pairs: how many pairs, or routes, of each folder.
+        seed: of weights, data and augmentation.
+        workers: processes that prepare samples.
+        mixed: whether products within the networks are made in bfloat16; sums and places stay in float32.
+    """
+
+    out: Path
+    train: tuple[Path, ...] = ()
+    validate: tuple[Path, ...] = ()
+    routes: tuple[Path, ...] = ()
+    validate_routes: tuple[Path, ...] = ()
+    networks: tuple[Network, ...] = ("region", "matching")
+    steps: int = 20_000
+    batch: int = 8
+    learning_rate: float = 1e-3
+    warm_up: int = 300
+    weight_decay: float = 0.01
+    clip: float = 5.0
+    ema: float = 0.998
+    every: int = 500
+    validation_pairs: int = 200
+    seed: int = 0
+    workers: int = 1
+    mixed: bool = True
