@@ -1,4 +1,5 @@
 import json
+import re
 
 import numpy as np
 import pytest
@@ -6,8 +7,11 @@ import pytest
 from imop import DemonstrationStore
 from imop.cli import main
 from imop.evaluation.trials import Trial, demonstration_for
+from imop.networks.model import load_model
+from imop.training.shards import write_shard
+from tests.training.test_pairs import pair
 
-VERBS = ("run", "collect", "eval", "import", "export", "check", "predict", "tasks")
+VERBS = ("run", "collect", "eval", "import", "export", "check", "predict", "tasks", "train", "model")
 POT = "tabletop/lid_off_pot"
 
 
@@ -51,6 +55,10 @@ def test_help_lists_the_verbs(capsys):
         (("check", "/nowhere"), "/nowhere"),
         (("import", "rlbench", "/nowhere", "/tmp/never.zarr"), "/nowhere"),
         (("predict", "--demo", "/nowhere", "--query", "/nowhere"), "/nowhere"),
+        (("train", "--out", "/tmp/never"), "train"),
+        (("train", "--out", "/tmp/never", "--train", "/nowhere", "--pose", "regressed"), "networks"),
+        (("train", "--out", "/tmp/never", "--train", "/nowhere"), "/nowhere"),
+        (("model", "--weights", "/nowhere"), "/nowhere"),
     ],
 )
 def test_bad_input_is_one_clear_line_and_exit_code_2(arguments, named, capsys):
@@ -107,3 +115,22 @@ def test_eval_writes_the_same_table_as_json_and_markdown(tmp_path, capsys):
     for method in ("oracle", "expert"):
         assert results["methods"][method]["tasks"]["lid_off_pot"] == {"successes": 2, "trials": 2}
     assert "lid_off_pot" in (tmp_path / "report.md").read_text()
+
+
+def test_model_counts_what_the_paper_counts(capsys):
+    assert imop("model", "--config", "paper") == 0
+    out = capsys.readouterr().out
+    assert all(name in out for name in ("region", "matching", "routing"))
+    (millions,) = re.findall(r"\(([\d.]+) M\)", out)
+    assert float(millions) == pytest.approx(80.8, rel=0.02)
+
+
+def test_train_writes_weights_that_model_describes(tmp_path, capsys):
+    (tmp_path / "shards").mkdir()
+    write_shard([pair(0), pair(1)], tmp_path / "shards" / "0.npz")
+    arguments = ("--train", tmp_path / "shards", "--steps", 1, "--batch", 1, "--workers", 0)
+    assert imop("train", "--out", tmp_path / "run", "--attention", "graph", *arguments) == 0
+    assert "step 1: focal" in capsys.readouterr().out
+    assert load_model(tmp_path / "run").config.matching.attention == "graph"
+    assert imop("model", "--weights", tmp_path / "run") == 0
+    assert "matching" in capsys.readouterr().out

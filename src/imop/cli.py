@@ -13,6 +13,8 @@ from rich.console import Console
 from tyro.conf import Positional
 
 from imop.errors import ImopError
+from imop.training.ablation import Ablation
+from imop.training.config import TrainConfig
 
 # Verbs import what they need when they run, so that --help does not wait for torch and MuJoCo.
 
@@ -260,6 +262,51 @@ def tasks(
     if contact_sheet is not None:
         save_contact_sheet(chosen, contact_sheet, jobs, console)
         console.print(contact_sheet, highlight=False)
+    return 0
+
+
+@app.command
+def train(
+    config: Annotated[TrainConfig, tyro.conf.OmitArgPrefixes],
+    ablation: Annotated[Ablation, tyro.conf.OmitArgPrefixes],
+    size: Literal["small", "paper"] = "small",
+) -> int:
+    """Train networks on shards; run again with the same arguments, it continues where it was stopped.
+
+    Shards are written by `python -m imop.training.generate` and its neighbours, see docs/training.md. Under
+    torchrun it trains on several processes or machines.
+
+    Args:
+        config: how to train.
+        ablation: what is left out of the networks or exchanged.
+        size: of the networks.
+    """
+    from imop.networks.model import PAPER, SMALL
+    from imop.training.loop import train as run_training
+
+    run_training(config, ablation.of(SMALL if size == "small" else PAPER), console=console)
+    console.print(config.out, highlight=False)
+    return 0
+
+
+@app.command
+def model(config: Literal["small", "paper"] = "small", weights: Path | None = None) -> int:
+    """Say how many parameters each network has.
+
+    Args:
+        config: which size.
+        weights: folder of trained weights to describe instead.
+    """
+    import torch
+
+    from imop.evaluation.model_table import model_table
+    from imop.networks.model import PAPER, SMALL, Model, load_model
+
+    if weights is not None:
+        console.print(model_table(load_model(weights), str(weights)))
+        return 0
+    with torch.device("meta"):
+        console.print(model_table(Model(SMALL if config == "small" else PAPER), config))
     return 0
 
 
