@@ -151,7 +151,7 @@ def show(results: dict[str, dict[str, Any]], steps: bool, console: Console) -> N
     table = Table(title="share of predictions near the recorded pose, up to symmetry")
     for name in ("method", "task", "step"):
         table.add_column(name)
-    for name in ("n", "1 cm & 5°", "2 cm & 10°", "cm med (p90)", "deg med (p90)"):
+    for name in ("n", "1 cm & 5°", "2 cm & 10°", "when it matters", "cm med (p90)", "deg med (p90)"):
         table.add_column(name, justify="right")
     for name in ("IoU", "routed", "ms", "conf."):
         table.add_column(name, justify="right")
@@ -176,6 +176,7 @@ def cells(s: dict[str, Any]) -> list[str]:
         str(s["n"]),
         share("within_1cm_5deg"),
         share("within_2cm_10deg"),
+        f"{number(s['within_2cm_10deg_of_not_repeatable'], '.0%')} of {s['not_repeatable']}",
         f"{number(s['position_median_m'], '.2f', 100)} ({number(s['position_p90_m'], '.1f', 100)})",
         f"{number(s['rotation_median_deg'], '.1f')} ({number(s['rotation_p90_deg'], '.1f')})",
         number(s["region_iou_mean"], ".2f"),

@@ -161,3 +161,9 @@ def test_the_overlap_of_a_region_with_an_object(recorded):
     both = np.concatenate([cube, plate])
     assert region_iou(both, observation, "target0/body") == pytest.approx(len(cube) / len(both))
     assert region_iou(cube, observation.stripped(), "target0/body") is None
+
+
+def test_a_step_counts_as_repeatable_if_the_state_gives_it_away(case):
+    rows = {row.step: row for row in ask("oracle", OraclePolicy, case) if row.query == "other"}
+    # Over the cube the demonstrated motion leads down to it; from the start it does not lead to the cube.
+    assert not rows[0].repeatable and rows[1].repeatable

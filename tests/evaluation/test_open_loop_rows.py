@@ -23,6 +23,13 @@ def test_what_was_not_predicted_is_a_miss_but_has_no_error():
     assert summary([missing])["position_median_m"] is None
 
 
+def test_steps_that_the_state_gives_away_do_not_count_where_it_matters():
+    good = {"position": 0.0, "rotation": 0.0}
+    found = summary([row(**good, repeatable=True), row(**good), row()])
+    assert found["within_2cm_10deg_of_not_repeatable"] == 0.5 and found["not_repeatable"] == 2
+    assert summary([row(repeatable=True)])["within_2cm_10deg_of_not_repeatable"] is None
+
+
 def test_routing_counts_only_where_there_is_a_router():
     assert summary([row()])["routing_accuracy"] is None
     assert summary([row(2, routed=2), row(3, routed=2), row(4)])["routing_accuracy"] == 0.5

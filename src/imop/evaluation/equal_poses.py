@@ -54,7 +54,9 @@ def errors(T_world_gripper: FloatArray, right: FloatArray) -> tuple[float, float
     """Metres and radians between a pose (4, 4) and the nearest of `right` (N, 4, 4)."""
     metres = se3.translation_distance(T_world_gripper, right)
     radians = se3.rotation_distance(T_world_gripper, right)
-    best = int(np.argmin(np.maximum(metres / NEAR[0], radians / NEAR[1])))
+    off = np.stack([metres / NEAR[0], radians / NEAR[1]])
+    # The sum decides among poses whose larger error is the same.
+    best = int(np.argmin(off.max(axis=0) + 1e-3 * off.sum(axis=0)))
     return float(metres[best]), float(radians[best])
 
 

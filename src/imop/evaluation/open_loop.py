@@ -13,7 +13,7 @@ import numpy as np
 from imop.errors import NoConfidentMatch
 from imop.evaluation.appearance import Appearance
 from imop.evaluation.equal_poses import equal_poses, errors
-from imop.evaluation.open_loop_rows import Row
+from imop.evaluation.open_loop_rows import COARSE, Row
 from imop.evaluation.oracle import OraclePolicy
 from imop.evaluation.rollout import Policy
 from imop.geometry import cloud as clouds
@@ -193,6 +193,8 @@ def _answer(
     if told:
         told.step = step
     row = Row(method, case.task, recorded.variation, case.support, query, step, keyframe.object_name)
+    right = equal_poses(recorded, step, case.appearance)
+    row = replace(row, repeatable=_repeats(case.demonstration.keyframes[step], keyframe, right))
     action = None
     started = time.perf_counter()
     try:
@@ -203,11 +205,16 @@ def _answer(
     if told:
         told.go_on()
         row = replace(row, routed=told.chosen)
-    return action, _compared(row, action, recorded, case.appearance) if action else row
+    return action, _compared(row, action, right) if action else row
 
 
-def _compared(row: Row, action: Action, recorded: Demonstration, appearance: Appearance | None) -> Row:
-    right = equal_poses(recorded, row.step, appearance)
+def _repeats(shown: Keyframe, asked: Keyframe, right: FloatArray) -> bool:
+    motion = se3.invert(shown.observation.T_world_gripper) @ shown.action.T_world_gripper
+    position, rotation = errors(asked.observation.T_world_gripper @ motion, right)
+    return position < COARSE[0] and rotation < np.radians(COARSE[1])
+
+
+def _compared(row: Row, action: Action, right: FloatArray) -> Row:
     position, rotation = errors(action.T_world_gripper, right)
     plain_position, plain_rotation = errors(action.T_world_gripper, right[:1])
     return replace(

@@ -34,6 +34,8 @@ class Row:
         milliseconds: from the images to the pose.
         region_iou: overlap of the policy's region with the step's object in the demonstration, where known.
         routed: step that the policy's own router chose, if it has one.
+        repeatable: whether the demonstrated motion of the gripper, repeated from where the gripper is in the
+            query, ends near a right pose: then the recorded state gives the answer away.
     """
 
     method: str
@@ -53,6 +55,7 @@ class Row:
     milliseconds: float = 0.0
     region_iou: float | None = None
     routed: int | None = None
+    repeatable: bool = False
 
     def within(self, limits: tuple[float, float]) -> bool:
         """Whether a right pose is nearer than `limits`, metres and degrees."""
@@ -75,6 +78,7 @@ def summary(rows: Sequence[Row]) -> dict[str, Any]:
     """Counts and medians of some rows; what nothing is known of is None. A missing prediction is a miss."""
     n = len(rows)
     fine, coarse = sum(row.within(FINE) for row in rows), sum(row.within(COARSE) for row in rows)
+    hard = [row.within(COARSE) for row in rows if not row.repeatable]
     return {
         "n": n,
         "within_1cm_5deg": fine / n,
@@ -82,6 +86,8 @@ def summary(rows: Sequence[Row]) -> dict[str, Any]:
         "within_2cm_10deg": coarse / n,
         "within_2cm_10deg_interval": wilson(coarse, n),
         "within_2cm_10deg_of_the_recorded_pose": sum(row.plainly_within(COARSE) for row in rows) / n,
+        "not_repeatable": len(hard),
+        "within_2cm_10deg_of_not_repeatable": sum(hard) / len(hard) if hard else None,
         "missing": sum(bool(row.problem) for row in rows) / n,
         "position_median_m": _median([row.position for row in rows]),
         "position_p90_m": _median([row.position for row in rows], 90),
