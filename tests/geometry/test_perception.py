@@ -6,7 +6,7 @@ import pytest
 from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, estimate_normals, fuse
-from imop.geometry.perception import Perception, supporting_plane
+from imop.geometry.perception import Perception, find_ground, supporting_plane
 from tests.geometry.test_cloud import flat_view, observation
 
 
@@ -82,3 +82,26 @@ def test_privileged_fields_change_nothing():
         instance_names={1: "box"},
     )
     np.testing.assert_array_equal(Perception()(plain).points, Perception()(told.stripped()).points)
+
+
+def tabletop(paint):
+    """A level table of 1,681 points, coloured by `paint`, with a column of 41 points on it."""
+    x, y = (v.ravel() for v in np.meshgrid(np.linspace(-0.2, 0.2, 41), np.linspace(-0.2, 0.2, 41)))
+    column = np.c_[np.full(41, 0.1), np.full(41, 0.1), np.linspace(0.01, 0.2, 41)]
+    points = np.r_[np.c_[x, y, np.zeros(len(x))], column]
+    normals = np.tile([0.0, 0, 1], (len(points), 1))
+    normals[len(x) :] = (1, 0, 0)
+    colors = np.float32(np.where(paint(points)[:, None], (0.9, 0.1, 0.1), (0.5, 0.5, 0.5)))
+    return PointCloud(points, colors, np.zeros(len(points), np.int32), normals)
+
+
+def test_a_mark_on_the_table_is_not_bare_ground():
+    cloud = tabletop(lambda p: np.linalg.norm(p[:, :2] + 0.1, axis=1) < 0.05)
+    red = cloud.colors[:, 0] > 0.8
+    bare = find_ground(cloud).bare
+    assert red.any() and np.array_equal(bare, ~red & (cloud.points[:, 2] < 0.008))
+
+
+def test_a_patterned_table_is_bare_ground():
+    cloud = tabletop(lambda p: np.floor(p[:, 0] / 0.05) % 2 == 0)
+    assert np.array_equal(find_ground(cloud).bare, cloud.points[:, 2] < 0.008)

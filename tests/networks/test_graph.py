@@ -4,12 +4,10 @@ import numpy as np
 import torch
 
 from imop.geometry import se3
-from imop.geometry.perception import supporting_plane
 from imop.networks.graph import (
     POINT_FEATURES,
     RADII,
     GraphConfig,
-    bare_plane,
     build_graph,
     collate,
     local_statistics,
@@ -102,11 +100,3 @@ def test_a_mark_on_the_plane_keeps_its_points():
         for c in (cloud, marked)
     ]
     assert inside[1] > 2 * inside[0] > 0
-
-
-def test_a_patterned_plane_has_no_marks():
-    cloud = tabletop()
-    level = cloud.points[:, 2] < 0.7501
-    stripes = level & (np.floor(cloud.points[:, 0] / 0.05) % 2 == 0)
-    patterned = replace(cloud, colors=np.where(stripes[:, None], np.float32([0.1, 0.1, 0.1]), cloud.colors))
-    assert bare_plane(patterned, supporting_plane(patterned))[level].all()

@@ -17,6 +17,9 @@ WORKSPACE_UPPER = (0.7, 0.5, 1.6)
 # Points nearer than this to the supporting plane belong to it, metres.
 PLANE_THICKNESS = 0.008
 
+# A point of the plane whose colour differs by more is a mark on it, unless less than this share is plain.
+MARKED, PLAIN_SHARE = 0.15, 0.8
+
 # Which of the points (N, 3) belong to the robot, given its joint positions and gripper opening.
 RobotMask = Callable[[FloatArray, FloatArray, float], BoolArray]
 
@@ -105,3 +108,40 @@ def supporting_plane(cloud: PointCloud, tilt: float = 0.2, bin_height: float = 0
     if normal[2] < np.cos(tilt):
         normal = np.array([0.0, 0.0, 1.0])
     return Plane(normal, float(normal @ center))
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """What of a cloud is bare ground.
+
+    Attributes:
+        plane: the supporting plane, or None if there is none.
+        bare: (N,) True for points of the plane itself, not of things on it nor of marks in its face. A mark
+            has another colour than most of the plane; where much has, the plane is patterned without marks.
+        lowest: z of the lowest point, metres.
+    """
+
+    plane: Plane | None
+    bare: BoolArray
+    lowest: float
+
+    def height(self, points: FloatArray) -> FloatArray:
+        """(N,) metres of points (N, 3) above the plane, or above the lowest point if there is none."""
+        return points[:, 2] - self.lowest if self.plane is None else self.plane.height(points)
+
+
+def find_ground(cloud: PointCloud) -> Ground:
+    """The bare ground of a cloud with normals, of at least one point.
+
+    Raises:
+        InvalidInput: if the cloud has no normals.
+    """
+    plane, lowest = supporting_plane(cloud), float(cloud.points[:, 2].min())
+    if plane is None:
+        return Ground(None, np.zeros(len(cloud), dtype=bool), lowest)
+    flat = np.abs(plane.height(cloud.points)) < PLANE_THICKNESS
+    if flat.any():
+        plain = np.abs(cloud.colors - np.median(cloud.colors[flat], axis=0)).max(axis=1) < MARKED
+        if np.mean(plain[flat]) >= PLAIN_SHARE:
+            flat &= plain
+    return Ground(plane, flat, lowest)

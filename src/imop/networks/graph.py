@@ -15,11 +15,9 @@ from torch import Tensor
 
 from imop.geometry.cloud import PointCloud, concatenate, farthest_points, grid_cells, voxel_downsample
 from imop.geometry.neighbours import nearest
-from imop.geometry.perception import PLANE_THICKNESS, Plane, supporting_plane
-from imop.types import BoolArray, FloatArray
+from imop.geometry.perception import Ground, find_ground
+from imop.types import FloatArray
 
-# A point of the plane whose colour differs by more is a mark on it, unless less than this share is plain.
-MARKED, PLAIN_SHARE = 0.15, 0.8
 # Statistics of the neighbourhood are taken at these radii, metres.
 RADII = (0.03, 0.07)
 STATISTICS = 9
@@ -102,9 +100,9 @@ class Graph:
         return Graph(tuple(level.to(device) for level in self.levels), self.features.to(device), self.size)
 
 
-def build_graph(cloud: PointCloud, config: GraphConfig) -> Graph:
-    """The graph of one cloud with normals, of at least one point."""
-    fine, height = thin(cloud, config)
+def build_graph(cloud: PointCloud, config: GraphConfig, ground: Ground | None = None) -> Graph:
+    """The graph of one cloud with normals, of at least one point; `ground` of the cloud, if it is known."""
+    fine, height = thin(cloud, config, ground)
     assert fine.normals is not None
     points, normals = fine.points, fine.normals
     features = np.concatenate(
@@ -126,31 +124,24 @@ def build_graph(cloud: PointCloud, config: GraphConfig) -> Graph:
     return Graph(tuple(levels), torch.from_numpy(features.astype(np.float32)), 1)
 
 
-def thin(cloud: PointCloud, config: GraphConfig) -> tuple[PointCloud, FloatArray]:
-    """At most `max_points` of the cloud, few of them on the bare plane, and their heights (N,) above it."""
-    plane = supporting_plane(cloud)
-    bare = bare_plane(cloud, plane)
-    above = voxel_downsample(cloud.select(~bare), config.voxel)
-    ground = voxel_downsample(cloud.select(bare), config.plane_voxel)
-    # The ground gets at most a third of what there is.
-    ground = ground.select(farthest_points(ground.points, config.max_points // 3))
-    above = above.select(farthest_points(above.points, config.max_points - len(ground)))
-    fine = concatenate([above, ground])
-    return fine, fine.points[:, 2] - fine.points[:, 2].min() if plane is None else plane.height(fine.points)
+def thin(
+    cloud: PointCloud, config: GraphConfig, ground: Ground | None = None
+) -> tuple[PointCloud, FloatArray]:
+    """At most `max_points` of the cloud, few of them bare ground, and their heights (N,) above it.
 
-
-def bare_plane(cloud: PointCloud, plane: Plane | None) -> BoolArray:
-    """(N,) True for points of the supporting plane itself, not of things on it nor of marks in its face.
-
-    A mark has another colour than most of the plane; where much has, the plane is patterned and has no marks.
+    Args:
+        cloud: with normals.
+        config: how densely.
+        ground: of the cloud, if it is known.
     """
-    if plane is None:
-        return np.zeros(len(cloud), dtype=bool)
-    flat = np.abs(plane.height(cloud.points)) < PLANE_THICKNESS
-    if not flat.any():
-        return flat
-    plain = np.abs(cloud.colors - np.median(cloud.colors[flat], axis=0)).max(axis=1) < MARKED
-    return flat if np.mean(plain[flat]) < PLAIN_SHARE else flat & plain
+    ground = ground or find_ground(cloud)
+    above = voxel_downsample(cloud.select(~ground.bare), config.voxel)
+    below = voxel_downsample(cloud.select(ground.bare), config.plane_voxel)
+    # The ground gets at most a third of what there is.
+    below = below.select(farthest_points(below.points, config.max_points // 3))
+    above = above.select(farthest_points(above.points, config.max_points - len(below)))
+    fine = concatenate([above, below])
+    return fine, ground.height(fine.points)
 
 
 def local_statistics(points: FloatArray, normals: FloatArray, radius: float) -> FloatArray:

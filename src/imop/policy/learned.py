@@ -16,8 +16,7 @@ from torch import Tensor
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, farthest_points
 from imop.geometry.neighbours import nearest, within
-from imop.geometry.perception import supporting_plane
-from imop.networks.graph import Graph, bare_plane, build_graph
+from imop.networks.graph import Graph, build_graph
 from imop.networks.matching import Correspondence, reposition
 from imop.networks.model import Model
 from imop.networks.region import StepBatch, one_step
@@ -69,9 +68,10 @@ class LearnedStep:
     def __init__(self, matcher: LearnedMatcher, step: Transition, p_gripper_held: FloatArray) -> None:
         self._matcher = matcher
         model = matcher.model
-        before, after = (build_graph(scene.cloud, model.config.graph) for scene in (step.before, step.after))
+        config = model.config.graph
+        before, after = (build_graph(s.cloud, config, s.ground) for s in (step.before, step.after))
         with torch.inference_mode():
-            logits = model.region(_batch(step, before, after, model.config.graph.neighbours))[-1]
+            logits = model.region(_batch(step, before, after, config.neighbours))[-1]
             self._described = model.matching.backbone(before)
         probability = torch.sigmoid(logits)
         inside = self._inside(probability)
@@ -97,10 +97,10 @@ class LearnedStep:
         if len(query.cloud) < 5:
             return ()
         model = self._matcher.model
-        seen = build_graph(query.cloud, model.config.graph)
+        seen = build_graph(query.cloud, model.config.graph, query.ground)
         with torch.inference_mode():
             found = model.matching(self._graph, self._chosen, seen, self._described)
-        things = query.cloud.select(~bare_plane(query.cloud, supporting_plane(query.cloud)))
+        things = query.cloud.select(~query.ground.bare)
         things = self._search.without_held(query, things)
         if len(things) < 5:
             return ()
@@ -172,7 +172,7 @@ def _dense(
     owner = nearest(cloud.points, graph.points.double().numpy())[1][:, 0]
     member = weight[owner] > 0
     # The bare table is found everywhere.
-    standing = member & ~bare_plane(cloud, supporting_plane(cloud))
+    standing = member & ~step.before.ground.bare
     member = standing if standing.sum() >= FEWEST else member
     region = cloud.select(member)
     p_held = se3.apply(step.before.observation.T_world_gripper, p_gripper_held)

@@ -7,12 +7,14 @@ and networks stand behind the same two calls.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from imop.geometry.cloud import PointCloud
+from imop.geometry.perception import Ground, find_ground
 from imop.types import Action, FloatArray, Observation
 
 
@@ -27,6 +29,11 @@ class Scene:
 
     observation: Observation
     cloud: PointCloud
+
+    @cached_property
+    def ground(self) -> Ground:
+        """What of the cloud is bare ground; found once."""
+        return find_ground(self.cloud)
 
 
 @dataclass(frozen=True, eq=False)
