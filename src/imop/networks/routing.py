@@ -8,14 +8,17 @@ table or turned about the vertical. Joint positions would, and are not used: the
 opening are, and where every point is as seen from the gripper, since clouds do not show the robot.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
 from imop.networks.backbone import Backbone, BackboneConfig
 from imop.networks.blocks import MLP, DenseBlock, pad, pool_max, pool_mean
-from imop.networks.graph import POINT_FEATURES, Graph
+from imop.networks.graph import POINT_FEATURES, Graph, collate
+from imop.types import FloatArray
 
 HAND_FEATURES = 7
 STATE = 7
@@ -29,7 +32,8 @@ class RoutingConfig:
     """Shape of the routing network.
 
     Attributes:
-        backbone: makes the scene features.
+        backbone: makes the scene features. By default points are not compared with their neighbours, since
+            the graph's features tell enough of them and routing has to learn from few scenes.
         width: of a state's feature.
         layers: rounds of attention among the demonstration's states and from the query to them.
         heads: of the attention.
@@ -37,7 +41,7 @@ class RoutingConfig:
     """
 
     backbone: BackboneConfig = field(
-        default_factory=lambda: BackboneConfig(POINT_FEATURES + HAND_FEATURES, (32, 64), (1, 1))
+        default_factory=lambda: BackboneConfig(POINT_FEATURES + HAND_FEATURES, (64,), (0,))
     )
     width: int = 96
     layers: int = 2
@@ -68,6 +72,18 @@ class States:
         return States(self.graph.to(device), *(t.to(device) for t in rest))
 
 
+def make_states(
+    graphs: Sequence[Graph], T_world_gripper: FloatArray, opening: Sequence[float], step: Sequence[float]
+) -> States:
+    """States of what was seen: graphs of clouds without the robot; the rest as in `States`."""
+    return States(
+        collate(graphs),
+        torch.from_numpy(np.asarray(T_world_gripper, dtype=np.float32)),
+        torch.tensor(list(opening), dtype=torch.float32),
+        torch.tensor(list(step), dtype=torch.float32),
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Described:
     """What the network makes of single states: features (N, width) and the robot's state (N, STATE)."""
@@ -83,7 +99,9 @@ class RoutingNetwork(nn.Module):
         super().__init__()
         self.config = config
         self.backbone = Backbone(config.backbone)
-        pooled = (2 + len(NEAR)) * config.backbone.widths[0] + len(NEAR)
+        width = config.backbone.widths[0]
+        self.point = nn.Sequential(nn.LayerNorm(width), MLP(width, 2 * width, width))
+        pooled = (2 + len(NEAR)) * width + len(NEAR)
         self.scene = MLP(pooled + STATE, 2 * config.width, config.width)
         self.within = nn.ModuleList(DenseBlock(config.width, config.heads) for _ in range(config.layers))
         self.across = nn.ModuleList(
@@ -114,7 +132,8 @@ class RoutingNetwork(nn.Module):
         hand, robot = _hand_features(local, distance), _robot_features(states)
         if not self.config.low_dimensional:
             hand, robot, distance = hand * 0, robot * 0, distance * 0
-        points = self.backbone(graph, torch.cat([graph.features, hand], dim=1)).float()
+        points = self.backbone(graph, torch.cat([graph.features, hand], dim=1))
+        points = (points + self.point(points)).float()
         pooled = [pool(points, graph.cloud, graph.size) for pool in (pool_mean, pool_max)]
         for radius in NEAR:
             weight = torch.exp(-((distance / radius) ** 2))

@@ -1,12 +1,13 @@
 """What a pair may look like without its truth changing."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import torch
 
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud
+from imop.networks.graph import Graph
 from imop.training.pairs import StepPair
 from imop.types import BoolArray, FloatArray
 
@@ -83,13 +84,9 @@ def _worse(
     return replace(thinner, points=noisy), inside[keep]
 
 
-def seen_differently(
-    clouds: Sequence[PointCloud], queries: int, rng: np.random.Generator
-) -> list[PointCloud]:
-    """A route's states in other light, seen less well; the first `queries` in one light, the rest in another.
-
-    Nothing moves, for the networks that see them do not notice where a state stands.
-    """
-    light = _light(rng, 0.25)
-    lights = (light @ _light(rng, 0.06), light)
-    return [_lit(_worse(cloud, rng)[0], lights[int(i >= queries)]) for i, cloud in enumerate(clouds)]
+def other_light(graph: Graph, rng: np.random.Generator, strength: float) -> Graph:
+    """The graph of the same cloud in other light; places stay, so that nothing has to be searched anew."""
+    light = torch.from_numpy(_light(rng, strength).astype(np.float32))
+    features = graph.features.clone()
+    features[:, :3] = ((features[:, :3] + 0.5) @ light.T).clamp(0, 1) - 0.5
+    return replace(graph, features=features)

@@ -1,19 +1,22 @@
 """Routes as tensors: a demonstration and some of its queries make a sample, samples side by side a batch."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from imop.networks.graph import GraphConfig, build_graph, collate
-from imop.networks.routing import UNKNOWN, States
-from imop.training.augment import seen_differently
+from imop.networks.graph import Graph, GraphConfig, build_graph, collate
+from imop.networks.routing import UNKNOWN, States, make_states
+from imop.training.augment import other_light
 from imop.training.routes import Query, Route, Seen
 
 QUERIES = 8
 """How many queries of a route make a training sample."""
+LIGHT, LIGHT_NOISE = 0.25, 0.05
+POSITION_NOISE, OPENING_NOISE = 0.002, 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,28 +71,41 @@ def make_route_sample(
         blind: whether what is expected is unknown.
     """
     queries = list(route.queries)
-    states = list(route.states)
     expected = [UNKNOWN if blind else float(query.expected) for query in queries]
+    light = 0
     if rng is not None:
-        chosen = rng.permutation(len(queries))[:QUERIES]
-        queries = [queries[i] for i in chosen]
+        light = int(rng.integers(2**32))
+        queries = [queries[i] for i in rng.permutation(len(queries))[:QUERIES]]
         expected = [_expected(query, rng) for query in queries]
-        queries, states = _differently(queries, states, rng)
     return RouteSample(
-        make_states(states, list(range(len(states))), config),
-        make_states([query.seen for query in queries], expected, config),
+        _states(route.states, list(range(len(route.states))), config, light, rng),
+        _states([query.seen for query in queries], expected, config, light, rng),
         torch.from_numpy(np.stack([query.right for query in queries])),
     )
 
 
-def make_states(seen: Sequence[Seen], steps: Sequence[float], config: GraphConfig) -> States:
-    """States as the network takes them; `steps` as in `States.step`."""
-    return States(
-        collate([build_graph(s.cloud, config) for s in seen]),
-        torch.from_numpy(np.stack([s.T_world_gripper for s in seen]).astype(np.float32)),
-        torch.tensor([s.opening for s in seen], dtype=torch.float32),
-        torch.tensor(list(steps), dtype=torch.float32),
-    )
+def _states(
+    seen: Sequence[Seen],
+    steps: Sequence[float],
+    config: GraphConfig,
+    light: int,
+    rng: np.random.Generator | None,
+) -> States:
+    """States as tensors; with `rng` in other light (of the number `light`) and with other readings."""
+    graphs = [graph_of(s, config) for s in seen]
+    poses, opening = np.stack([s.T_world_gripper for s in seen]), np.array([s.opening for s in seen])
+    if rng is not None:
+        graphs = [other_light(g, np.random.default_rng(light), LIGHT) for g in graphs]
+        graphs = [other_light(g, rng, LIGHT_NOISE) for g in graphs]
+        poses[:, :3, 3] += rng.normal(0, POSITION_NOISE, (len(seen), 3))
+        opening = np.clip(opening + rng.normal(0, OPENING_NOISE, len(seen)), 0.0, 1.0)
+    return make_states(graphs, poses, opening.tolist(), steps)
+
+
+@lru_cache(maxsize=50_000)
+def graph_of(seen: Seen, config: GraphConfig) -> Graph:
+    """The graph of a state's cloud; searching takes longer than learning, so the last ones are kept."""
+    return build_graph(seen.cloud, config)
 
 
 def _expected(query: Query, rng: np.random.Generator) -> float:
@@ -100,22 +116,6 @@ def _expected(query: Query, rng: np.random.Generator) -> float:
     if kind < 0.85:
         return float(query.expected)
     return float(max(0, query.expected + (1 if kind < 0.95 else int(rng.integers(-2, 3)))))
-
-
-def _differently(
-    queries: Sequence[Query], states: Sequence[Seen], rng: np.random.Generator
-) -> tuple[list[Query], list[Seen]]:
-    """Demonstration and queries in other light, seen less well, with other readings of the gripper."""
-    clouds = [*(query.seen.cloud for query in queries), *(state.cloud for state in states)]
-    worse = seen_differently(clouds, len(queries), rng)
-    readings = [*(query.seen.opening for query in queries), *(state.opening for state in states)]
-    openings = np.clip(np.array(readings) + rng.normal(0, 0.01, len(readings)), 0.0, 1.0)
-    seen = [
-        Seen(cloud, old.T_world_gripper, float(opening))
-        for cloud, old, opening in zip(worse, [*(q.seen for q in queries), *states], openings, strict=True)
-    ]
-    asked = [replace(query, seen=s) for query, s in zip(queries, seen, strict=False)]
-    return asked, seen[len(queries) :]
 
 
 def collate_routes(samples: Sequence[RouteSample]) -> RouteBatch:

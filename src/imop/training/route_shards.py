@@ -43,6 +43,7 @@ class RouteShard:
 
     def __init__(self, path: Path):
         self._arrays = read_arrays(path, VERSION, "state_start")
+        self._known: dict[int, Seen] = {}
 
     def __len__(self) -> int:
         return len(self._arrays["state_start"]) - 1
@@ -59,5 +60,9 @@ class RouteShard:
         return Query(self._seen(int(a["queries"][number])), int(a["expected"][number]), right)
 
     def _seen(self, number: int) -> Seen:
-        a = self._arrays
-        return Seen(read_cloud(a, number), a["gripper"][number], float(a["opening"][number]))
+        """Always the same object for the same number, so that what is made of it can be kept."""
+        if number not in self._known:
+            a = self._arrays
+            cloud = read_cloud(a, number)
+            self._known[number] = Seen(cloud, a["gripper"][number], float(a["opening"][number]))
+        return self._known[number]
