@@ -53,7 +53,7 @@ class LearnedMatcher:
     samples: int = 4000
     places: int = 2
     turns: int = 24
-    search: SearchConfig = field(default_factory=lambda: SearchConfig(refined=5, finished=2))
+    search: SearchConfig = field(default_factory=lambda: SearchConfig(refined=4, finished=2, righted=3))
     seed: int = 0
 
     def prepare(self, steps: Sequence[Transition]) -> list["LearnedStep"]:

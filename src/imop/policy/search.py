@@ -31,6 +31,7 @@ class SearchConfig:
     Attributes:
         refined: how many seeds are refined by closest points.
         finished: how many of the refined motions get the finest stage too.
+        righted: how many of the best are set upright, too.
         turn: share of its score that a hypothesis loses for half a turn off the demonstrated motion.
         tilt: share that it loses for tilting things by `TILTED` or more.
         change: share that it loses for another place than the demonstrated motion leads to.
@@ -38,6 +39,7 @@ class SearchConfig:
 
     refined: int = 12
     finished: int = 4
+    righted: int = 12
     turn: float = 0.03
     tilt: float = 0.35
     change: float = 0.12
@@ -103,7 +105,9 @@ class Search:
         # The last half millimetre is worth looking for only where it matters.
         finished = [refine(self._fine, h.T_query_support, FINEST) for h in found[: self._config.finished]]
         found += [judge.judge(T) for T in finished]
-        return found + [judge.judge(upright(h.T_query_support, self._center)) for h in found]
+        found.sort(key=lambda hypothesis: -hypothesis.score)
+        best = found[: self._config.righted]
+        return found + [judge.judge(upright(h.T_query_support, self._center)) for h in best]
 
     def _preference(self, hypothesis: Hypothesis, T_repeated: FloatArray, begun: bool) -> float:
         """The score, less for moving otherwise than demonstrated and for tilting what stands on a table.
