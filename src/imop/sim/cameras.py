@@ -4,6 +4,7 @@ Camera frames are OpenCV's: x right, y down, z forward. Pixel (u, v) looks along
 measured along the optical axis. Nothing hit, or farther than the far plane, is depth 0 and instance 0.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -136,9 +137,9 @@ def _render(world: World, camera: Camera, width: int, height: int) -> CameraView
     return CameraView(rgb, depth, K, T, ids.reshape(height, width))
 
 
-def render(world: World, size: int = 128) -> dict[str, CameraView]:
-    """All of `CAMERAS`, `size` x `size` pixels."""
-    return {name: _render(world, camera, size, size) for name, camera in CAMERAS.items()}
+def render(world: World, size: int = 128, cameras: Mapping[str, Camera] = CAMERAS) -> dict[str, CameraView]:
+    """What all cameras see, `size` x `size` pixels."""
+    return {name: _render(world, camera, size, size) for name, camera in cameras.items()}
 
 
 def render_view(world: World, camera: str | Camera, width: int = 320, height: int = 240) -> ByteArray:
@@ -167,10 +168,12 @@ def look_at(
     return Camera(se3.make(R, eye), float(np.radians(fov_degrees)), 10.0)
 
 
-def observe(world: World, time_step: int = 0, size: int = 128) -> Observation:
+def observe(
+    world: World, time_step: int = 0, size: int = 128, cameras: Mapping[str, Camera] = CAMERAS
+) -> Observation:
     """What the robot sees (images of `size` x `size`) and feels now, with instance ids for training."""
     return Observation(
-        views=render(world, size),
+        views=render(world, size, cameras),
         T_world_gripper=world.T_world_gripper,
         gripper_opening=world.gripper_opening,
         time_step=time_step,

@@ -11,6 +11,7 @@ from imop.training import steps
 from imop.training.families.thing import Family, Thing
 from imop.training.stage import Stage, State, Unreachable, above_table
 from imop.training.steps import Recipe
+from imop.training.viewpoints import placed_cameras
 from imop.types import BoolArray, FloatArray
 
 MOST_THINGS = 8
@@ -105,7 +106,7 @@ def draw_scene(
         cast.add()
     for items in (cast.things, cast.kinds):
         del items[max(MOST_THINGS, acting) :]
-    stage = Stage(cast.things)
+    stage = Stage(cast.things, placed_cameras(rng.spawn(1)[0]))
     recipes = [_recipe(stage, part, rng) for part in parts]
     recipe = recipes[0]
     for other in recipes[1:]:

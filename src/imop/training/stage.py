@@ -10,7 +10,7 @@ from imop.geometry import se3
 from imop.geometry.cloud import PointCloud
 from imop.geometry.perception import Perception
 from imop.networks.graph import GraphConfig, thin
-from imop.sim.cameras import observe
+from imop.sim.cameras import CAMERAS, Camera, observe
 from imop.sim.kinematics import inverse_kinematics
 from imop.sim.parts.shapes import add_to
 from imop.sim.robot import FINGER_STROKE, PANDA_HOME_Q, panda_self_filter
@@ -71,8 +71,8 @@ class State:
 class Stage:
     """Things compiled into one scene, to be posed and looked at any number of times."""
 
-    def __init__(self, things: Sequence[Thing]):
-        self.things = tuple(things)
+    def __init__(self, things: Sequence[Thing], cameras: Mapping[str, Camera] = CAMERAS):
+        self.things, self._cameras = tuple(things), cameras
         spec = scene_spec()
         for i, thing in enumerate(things):
             add_to(spec, f"thing{i}", thing.part)
@@ -161,7 +161,7 @@ class Stage:
     ) -> Observation:
         """What the cameras see in `size` x `size` pixels, with the noise of real ones."""
         self.pose(state)
-        return noise(observe(self._world, size=size), rng)
+        return noise(observe(self._world, size=size, cameras=self._cameras), rng)
 
     def cloud(
         self,
