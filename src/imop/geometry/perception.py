@@ -102,11 +102,12 @@ def supporting_plane(cloud: PointCloud, tilt: float = 0.2, bin_height: float = 0
         near = level[np.abs(level[:, 2] - height) < reach]
         center = near.mean(axis=0)
         height = float(center[2])
-    normal = np.linalg.svd(near - center, full_matrices=False)[2][2]
+    up = np.array([0.0, 0.0, 1.0])
+    # Two points, or a thin strip, determine no tilt; a table is level.
+    normal = np.linalg.svd(near - center, full_matrices=False)[2][2] if len(near) > 2 else up
     normal = normal if normal[2] > 0 else -normal
-    # A thin strip determines no tilt; a table is level.
     if normal[2] < np.cos(tilt):
-        normal = np.array([0.0, 0.0, 1.0])
+        normal = up
     return Plane(normal, float(normal @ center))
 
 
