@@ -7,10 +7,12 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
 from imop.errors import CorruptData, InvalidInput
+from imop.geometry import se3
 from imop.networks.graph import GraphConfig
 from imop.networks.matching import MatchingConfig
 from imop.networks.model import Model, ModelConfig, load_model, save_model
@@ -197,3 +199,14 @@ def test_two_processes_train_as_one(shards, tmp_path):
     one, two = gradients(tmp_path / "one"), gradients(tmp_path / "two")
     for a, b in zip(one, two, strict=True):
         torch.testing.assert_close(a, b, atol=1e-6, rtol=1e-3)
+
+
+def test_sources_are_drawn_by_their_shares(shards, tmp_path):
+    with pytest.raises(InvalidInput, match="shares"):
+        PairDataset([shards, shards], CONFIG, seed=0, shares=(1.0,))
+    lone = tmp_path / "lone"
+    lone.mkdir()
+    write_shard([replace(pair(0), T_world_goal=se3.make(p=(0.0, 0.0, 5.0)))], lone / "0.npz")
+    drawn = PairDataset([shards, lone], CONFIG, seed=0, shares=(1.0, 4.0))
+    high = [float(drawn[i].poses[0, 2, 3]) > 3 for i in range(40)]
+    assert 0.6 < np.mean(high) < 0.97

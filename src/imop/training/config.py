@@ -13,7 +13,8 @@ class TrainConfig:
 
     Attributes:
         out: folder of the checkpoint, the weights and the log.
-        train: folders of shards of pairs to train region and matching on, equally often.
+        train: folders of shards of pairs to train region and matching on.
+        shares: how often each of these folders is drawn from; equally if none are given.
         validate: folders of shards to validate them on, each reported by its name.
         routes: folders of shards of routes to train routing on, equally often.
         validate_routes: folders of shards to validate it on, each reported by its name.
@@ -34,6 +35,7 @@ class TrainConfig:
 
     out: Path
     train: tuple[Path, ...] = ()
+    shares: tuple[float, ...] = ()
     validate: tuple[Path, ...] = ()
     routes: tuple[Path, ...] = ()
     validate_routes: tuple[Path, ...] = ()

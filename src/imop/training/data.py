@@ -7,7 +7,7 @@ from typing import Any, Generic, Protocol, TypeVar, overload
 import numpy as np
 from torch.utils.data import DataLoader, Dataset
 
-from imop.errors import CorruptData
+from imop.errors import CorruptData, InvalidInput
 from imop.networks.model import ModelConfig
 from imop.training.augment import augment
 from imop.training.pairs import PairBatch, Sample, collate_samples, make_sample
@@ -22,18 +22,27 @@ class PairDataset(Dataset[Sample]):
     """Augmented samples from folders of shards.
 
     Args:
-        folders: of shards; each is drawn from equally often.
+        folders: of shards.
         config: how clouds become graphs.
         seed: of sources, pairs and augmentation.
         augmented: whether to augment at all; validation does not.
+        shares: how often each folder is drawn from; equally if none are given.
 
     Raises:
         CorruptData: if a folder has no shard, or one cannot be read.
+        InvalidInput: if there is not one positive share for each folder.
     """
 
-    def __init__(self, folders: Sequence[Path], config: ModelConfig, seed: int, augmented: bool = True):
+    def __init__(
+        self,
+        folders: Sequence[Path],
+        config: ModelConfig,
+        seed: int,
+        augmented: bool = True,
+        shares: Sequence[float] = (),
+    ):
         self._config, self._seed, self._augmented = config, seed, augmented
-        self._source = _Source(folders, Shard)
+        self._source = _Source(folders, Shard, shares)
 
     def __len__(self) -> int:
         return len(self._source)
@@ -114,7 +123,13 @@ class _Items(Protocol[Item]):
 class _Source(Generic[Item]):
     """Everything in the shards of some folders."""
 
-    def __init__(self, folders: Sequence[Path], read: Callable[[Path], _Items[Item]]):
+    def __init__(
+        self, folders: Sequence[Path], read: Callable[[Path], _Items[Item]], shares: Sequence[float] = ()
+    ):
+        shares = shares or [1.0] * len(folders)
+        if len(shares) != len(folders) or min(shares) <= 0:
+            raise InvalidInput("shares", f"{tuple(shares)}", f"{len(folders)} positive numbers")
+        self._shares = np.asarray(shares) / sum(shares)
         self._shards = [[read(path) for path in _paths(folder)] for folder in folders]
         self._ends = [np.cumsum([len(shard) for shard in shards]) for shards in self._shards]
 
@@ -123,7 +138,7 @@ class _Source(Generic[Item]):
 
     def pick(self, rng: np.random.Generator, index: int | None) -> Item:
         """Anything from any folder; with an `index` that one of the folder."""
-        source = int(rng.integers(len(self._shards)))
+        source = int(rng.choice(len(self._shards), p=self._shares))
         ends = self._ends[source]
         number = int(rng.integers(ends[-1])) if index is None else index % int(ends[-1])
         shard = int(np.searchsorted(ends, number, side="right"))

@@ -156,7 +156,7 @@ def _batches(config: TrainConfig, state: TrainState, last: int, world: int, rank
     pairs: Iterator[PairBatch | None] = repeat(None)
     routes: Iterator[RouteBatch | None] = repeat(None)
     if config.train:
-        dataset = PairDataset(config.train, shape, config.seed)
+        dataset = PairDataset(config.train, shape, config.seed, shares=config.shares)
         pairs = iter(loader(dataset, numbers, config.batch, config.workers))
     if config.routes:
         routed = RouteDataset(config.routes, shape, config.seed)
