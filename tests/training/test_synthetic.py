@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -5,8 +7,10 @@ from imop.geometry import se3
 from imop.geometry.neighbours import nearest
 from imop.training.families import HELD_OUT, TRAINING
 from imop.training.generate import generate
+from imop.training.scenes import Scene, demonstrate
 from imop.training.shards import Shard
 from imop.training.stage import Stage, State
+from imop.training.steps import press
 from imop.training.synthetic import right_motions, synthetic_pairs
 
 
@@ -72,6 +76,22 @@ def test_families_for_testing_only_are_no_training_families():
 
 def test_held_out_scenes_have_pairs():
     assert len(list(synthetic_pairs(1, 4, HELD_OUT))) == 4
+
+
+def test_ropes_lie_otherwise_in_every_scene_and_keep_their_length():
+    draw = np.random.default_rng
+    thing = HELD_OUT["rope"](draw(0), draw(1))
+    scene = Scene(Stage([thing]), (0,), press(Stage([HELD_OUT["rope"](draw(0), draw(1))]), 0, draw(2)))
+    lies = []
+    for seed in range(3):
+        poses = scene.stage.link_poses(demonstrate(scene, draw(seed))[0])
+        middles = np.stack([poses[0, link][:3, 3] for link in ("body", *thing.bends)])
+        assert np.linalg.norm(np.diff(middles, axis=0), axis=1) == pytest.approx(
+            np.full(len(thing.bends), 0.02), abs=0.003
+        )
+        assert np.ptp(middles[:, 2]) < 1e-6
+        lies.append(se3.apply(se3.invert(poses[0, "body"]), middles)[-1])
+    assert all(np.linalg.norm(a - b) > 0.01 for a, b in pairwise(lies))
 
 
 @pytest.mark.parametrize("name", list(EVERY))

@@ -164,11 +164,20 @@ def _arrange(scene: Scene, rng: np.random.Generator) -> State:
             low, high = moving.positions
             ajar = rng.random() < 0.15
             joints[i, moving.joint] = rng.uniform(min(low, high), max(low, high)) if ajar else low
+        if thing.bends:
+            angles = _bend(len(thing.bends), rng)
+            joints |= {(i, hinge): float(a) for hinge, a in zip(thing.bends, angles, strict=True)}
     joints |= recipe.joints
     start = se3.make(p=rng.uniform(-0.08, 0.08, 3)) @ stage.home @ se3.make(se3.euler(z=rng.normal(0, 0.2)))
     first = recipe.steps[0]
     state = State(poses, joints, gripper_open=first.gripper_open, opening=float(first.gripper_open))
     return State(poses, joints, start, state.opening, state.gripper_open, _near_home(start))
+
+
+def _bend(hinges: int, rng: np.random.Generator) -> FloatArray:
+    """(hinges,) angles of a smooth curve that winds to both sides, radians."""
+    swing, turns, phase = rng.uniform(0.05, 0.45), rng.uniform(0.5, 1.5), rng.uniform(-np.pi, np.pi)
+    return np.asarray(swing * np.sin(turns * np.linspace(0, 2 * np.pi, hinges) + phase))
 
 
 def _near_home(T_world_gripper: FloatArray) -> FloatArray:

@@ -1,7 +1,6 @@
 """Kinds of things of the novel tasks, for testing only: no training run behind bundled weights sees them."""
 
-from itertools import pairwise
-
+import mujoco
 import numpy as np
 
 from imop.geometry import se3
@@ -11,6 +10,7 @@ from imop.sim.parts.faucet import SIDES, FaucetShape, faucet
 from imop.sim.parts.hinged_box import LID, BoxShape, hinged_box
 from imop.sim.parts.laptop import COVER, LaptopShape, laptop
 from imop.sim.parts.pot import PotShape, lid, pot
+from imop.sim.parts.rope import RopeShape
 from imop.sim.parts.shapes import PLASTIC, box, capsule, part
 from imop.training.families.solids import HALF_TURN
 from imop.training.families.thing import (
@@ -125,25 +125,20 @@ def lidded_box(shape: np.random.Generator, color: np.random.Generator) -> Thing:
 
 
 def rope(shape: np.random.Generator, color: np.random.Generator) -> Thing:
-    """A curved rope with coloured ends, stiff as long as it is posed by hand; frame: its middle, lying."""
-    count, pitch, r = int(shape.integers(9, 15)), shape.uniform(0.018, 0.026), shape.uniform(0.006, 0.01)
-    swing, phase = shape.uniform(0.2, 1.1), shape.uniform(-np.pi, np.pi)
-    heading = swing * np.cos(2 * np.pi * np.linspace(0, 1, count) + phase)
-    ends = np.cumsum(pitch * np.stack([np.cos(heading), np.sin(heading)], axis=1), axis=0)
-    ends -= ends.mean(axis=0)
-    spec, body = part(fixed=True)
-    first = paint(color)
-    for a, b in pairwise(ends[1:-1]):
-        capsule(body, (*a.tolist(), r), (*b.tolist(), r), r, first, PLASTIC)
-    holds = []
-    for name, inner, end in (("first", ends[1], ends[0]), ("last", ends[-2], ends[-1])):
-        middle, way = (inner + end) / 2, end - inner
-        yaw = float(np.arctan2(way[1], way[0]))
-        quaternion = [np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)]
-        tip = body.add_body(name=name, pos=[*middle.tolist(), r], quat=quaternion)
-        box(tip, (-pitch / 2, -1.6 * r, -r), (pitch / 2, 1.6 * r, r), paint(color), PLASTIC)
-        holds.append(Hold(from_above((float(middle[0]), float(middle[1]), r), yaw), width=3.2 * r))
-    return Thing(spec, tuple(holds))
+    """A rope with coloured ends that lies otherwise in every scene; frame: one end, the rope along +x."""
+    sizes = RopeShape(int(shape.integers(9, 13)), shape.uniform(0.018, 0.022), shape.uniform(0.006, 0.01))
+    spec, body = part()
+    r, half, first, bends = sizes.radius, sizes.pitch / 2, paint(color), []
+    box(body, (-half, -1.6 * r, -r), (half, 1.6 * r, r), paint(color), PLASTIC)
+    for i in range(1, sizes.links):
+        body = body.add_body(name=f"link{i}", pos=[sizes.pitch, 0, 0])
+        body.add_joint(name=f"link{i}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1], pos=[-half, 0, 0])
+        bends.append(f"link{i}")
+        if i < sizes.links - 1:
+            capsule(body, (-half, 0, 0), (half, 0, 0), r, first, PLASTIC)
+        else:
+            box(body, (-half, -1.6 * r, -r), (half, 1.6 * r, r), paint(color), PLASTIC)
+    return Thing(spec, (Hold(from_above((0, 0, 0)), width=3.2 * r),), bends=tuple(bends))
 
 
 HELD_OUT: dict[str, Family] = {

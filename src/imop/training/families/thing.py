@@ -56,7 +56,8 @@ class Thing:
         pokes: where closed fingers press on it along the gripper's z axis.
         spots: T_body_spot (4, 4) frames, z outwards, where something may be put down, in, over or on.
         mount: T_body_mount (4, 4): what comes to a spot; None is the middle of its underside.
-        moving: its joints.
+        moving: its joints that one moves.
+        bends: hinges that stand at random in every scene, as a rope's do.
         symmetry: (S, 4, 4) motions of the body's frame that change nothing that can be seen.
         rests: rotations (3, 3) in which it lies stably.
         tool: T_body_tip (4, 4) of its working end, z outwards, or None if it is no tool.
@@ -68,6 +69,7 @@ class Thing:
     spots: tuple[FloatArray, ...] = ()
     mount: FloatArray | None = None
     moving: tuple[Moving, ...] = ()
+    bends: tuple[str, ...] = ()
     symmetry: FloatArray = field(default_factory=lambda: np.eye(4)[None])
     rests: tuple[FloatArray, ...] = (np.eye(3),)
     tool: FloatArray | None = None
