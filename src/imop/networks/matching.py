@@ -1,8 +1,8 @@
 """The matching network: which point of a new state is which point of the invariant region?
 
 Paper, section III-C1: cross attention between the region's graph and the query's, dual softmax. After every
-layer the region is carried to where the matches so far say it is (the repositioning of Lepard, Li and Harada,
-CVPR 2022), so that the next layer may look at who is near.
+layer the region is carried to where most matches so far say it is (the repositioning of Lepard, Li and
+Harada, CVPR 2022), so that the next layer may look at who is near.
 """
 
 from collections.abc import Callable
@@ -16,6 +16,11 @@ from imop.geometry.procrustes import weighted_procrustes
 from imop.networks.backbone import Backbone, BackboneConfig, level_relations
 from imop.networks.blocks import MLP, RELATION, UNIT, DenseBlock, GraphBlock, exact, gather, pad, relation
 from imop.networks.graph import Graph
+
+# Query points per region point that a motion is fitted to.
+LIKELIEST = 3
+# Distances (metres) up to which matches count, one fit after the other.
+REACHES = (0.3, 0.2, 0.13, 0.09, 0.06, 0.04, 0.028, 0.02)
 
 
 @dataclass(frozen=True)
@@ -127,7 +132,8 @@ class MatchingNetwork(nn.Module):
             x, y_padded = cross(k, x, y_padded, sides, T)
             y = y_padded[query_present]
             matrices.append(self._match(k, x, y_padded, sides))
-            T = reposition(matrices[-1], sides.p_x, sides.p_y)
+            if k + 1 < self.config.layers:
+                T = reposition(matrices[-1], sides.p_x, sides.p_y)
         return Correspondence(matrices, p_x, p_y, region_present, query_present)
 
     def _match(self, k: int, x: Tensor, y: Tensor, sides: "_Sides") -> Tensor:
@@ -197,11 +203,26 @@ def dual_softmax(scores: Tensor, rows: Tensor, columns: Tensor) -> Tensor:
 
 
 def reposition(matrix: Tensor, p_x: Tensor, p_y: Tensor) -> Tensor:
-    """(B, 4, 4) motion of the region, least squares over each point's best match; no gradient."""
+    """(B, 4, 4) motion of the region that most of the likeliest matches agree on; no gradient.
+
+    Least squares as in the paper, reweighted while the reach within which matches still count shrinks: many
+    matches are of equal parts or of the wrong side, and their average would be nowhere.
+
+    Args:
+        matrix: (B, R, Q) confidence of each pair.
+        p_x: (B, R, 3) region.
+        p_y: (B, Q, 3) query.
+    """
     with torch.no_grad(), exact(p_x):
-        weight, best = matrix.to(p_x.dtype).max(dim=2)
-        matched = torch.gather(p_y, 1, best[..., None].expand(-1, -1, 3))
-        return weighted_procrustes(p_x, matched, weight).T_y_x
+        weight, best = matrix.to(p_x.dtype).topk(min(LIKELIEST, matrix.shape[2]), dim=2)
+        y = torch.gather(p_y, 1, best.flatten(1)[..., None].expand(-1, -1, 3))
+        x = p_x.repeat_interleave(weight.shape[2], dim=1)
+        weight = weight.flatten(1)
+        T = weighted_procrustes(x, y, weight).T_y_x
+        for reach in REACHES:
+            agreeing = weight / (1 + ((_moved(T, x) - y) / reach).square().sum(-1)).square()
+            T = weighted_procrustes(x, y, agreeing).T_y_x
+        return T
 
 
 def _moved(T: Tensor, p: Tensor) -> Tensor:
