@@ -9,7 +9,7 @@ is fixed to; what really stays in place with the action is known from the poses 
 
 import sys
 from collections import Counter
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -92,6 +92,10 @@ class Score:
     found: int = 0
     exact: int = 0
     misses: Counter[str] = field(default_factory=Counter)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The layout of the report."""
+        return {**vars(self), "misses": dict(self.misses)}
 
 
 class _Watched:
@@ -206,7 +210,8 @@ def main() -> int:
         for miss, count in score.misses.most_common():
             console.print(f"{task}: {count} x {miss}", highlight=False, soft_wrap=True)
     if options.json:
-        save_json({task: asdict(score) for task, score in (*scores.items(), ("all", total))}, options.json)
+        written = {task: score.as_dict() for task, score in (*scores.items(), ("all", total))}
+        save_json(written, options.json)
     return 0
 
 
