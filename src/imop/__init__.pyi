@@ -2,6 +2,8 @@ from .demos.load import load_demonstrations
 from .demos.store import DemonstrationStore
 from .errors import ImopError, InvalidInput, NoConfidentMatch, PlanFailed
 from .geometry.perception import Perception
+from .policy.learned import LearnedMatcher
+from .policy.learned_router import LearnedRouter
 from .policy.one_shot import OneShotPolicy
 from .policy.registration import RegistrationMatcher
 from .sim.robot import panda_self_filter
@@ -17,6 +19,8 @@ __all__ = [
     "ImopError",
     "InvalidInput",
     "Keyframe",
+    "LearnedMatcher",
+    "LearnedRouter",
     "NoConfidentMatch",
     "Observation",
     "OneShotPolicy",

@@ -29,7 +29,8 @@ def run(
     variation: int = 0,
     instance: int = 0,
     demo: Path | None = None,
-    method: Literal["replay", "registration", "oracle"] = "registration",
+    method: Literal["learned", "replay", "registration", "oracle"] = "learned",
+    weights: Path | None = None,
     min_confidence: float = 0.0,
     video: bool = True,
     out: Path = Path("runs/run"),
@@ -45,6 +46,7 @@ def run(
         instance: seed of the objects' shapes, sizes and colours.
         demo: folder with a recorded demonstration, its first episode; records one if not given.
         method: how poses are carried over from the demonstration.
+        weights: folder that `imop train` wrote; by default the bundled weights.
         min_confidence: stop instead of acting below this confidence, 0 to 1.
         video: whether to draw rollout.mp4, which takes longer than the task itself.
         out: folder for the results.
@@ -57,7 +59,7 @@ def run(
     with console.status(f"recording one demonstration of {task}" if demo is None else f"reading {demo}"):
         shown = demonstration_for(trial) if demo is None else load_demonstrations(demo, 1)[0]
     with console.status(f"performing {task} in scene {seed}"):
-        result = perform(trial, shown, method, out, min_confidence, video)
+        result = perform(trial, shown, method, out, min_confidence, video, weights)
     console.print(steps_table(result))
     verdict = "[green]success[/]" if result.success else f"[red]failed[/]: {result.reason}"
     console.print(f"{task}, scene {seed}: {verdict}")
@@ -115,11 +117,12 @@ def evaluate(
     suite: str = "tabletop",
     split: str = "all",
     tasks: tuple[str, ...] = (),
-    methods: Annotated[str, tyro.conf.arg(metavar="NAME,NAME")] = "replay,registration,oracle,expert",
+    methods: Annotated[str, tyro.conf.arg(metavar="NAME,NAME")] = "replay,registration,learned,oracle,expert",
     episodes: int = 25,
     seed: int = 0,
     instance: int = 0,
     jobs: int = 2,
+    weights: Path | None = None,
     out: Path = Path("runs/eval"),
 ) -> int:
     """Success rates of several methods on the same demonstrations and scenes.
@@ -130,16 +133,19 @@ def evaluate(
         suite: which suite.
         split: base, novel, cross_object or all.
         tasks: names within the split; all if none is given.
-        methods: any of replay, registration, oracle (true object poses), expert, joined by commas.
+        methods: any of replay, registration, learned, oracle (true object poses), expert, joined by commas.
         episodes: scenes per task, spread over its variations.
         seed: first seed of the scenes.
         instance: seed of the objects' shapes, sizes and colours.
         jobs: parallel processes.
+        weights: folder that `imop train` wrote, for the learned policy; by default the bundled weights.
         out: folder for the results.
     """
     from imop.evaluation.benchmark import evaluate_suite
 
-    results = evaluate_suite(suite, split, tasks, methods.split(","), episodes, seed, instance, jobs, console)
+    results = evaluate_suite(
+        suite, split, tasks, methods.split(","), episodes, seed, instance, jobs, console, weights
+    )
     results.save(out)
     console.print(results.table())
     console.print(f"{out / 'report.md'}\n{out / 'results.json'}", highlight=False)
@@ -214,7 +220,8 @@ def check(path: Positional[Path]) -> int:
 def predict(
     demo: Path,
     query: Path,
-    method: Literal["replay", "registration"] = "registration",
+    method: Literal["learned", "replay", "registration"] = "learned",
+    weights: Path | None = None,
     out: Path = Path("runs/predict"),
 ) -> int:
     """Predict the action at every keyframe of a recorded episode from one demonstration; nothing moves.
@@ -225,6 +232,7 @@ def predict(
         demo: the demonstration: a store or an RLBench episode, its first episode.
         query: the recorded episode to predict, likewise.
         method: how poses are carried over from the demonstration.
+        weights: folder that `imop train` wrote; by default the bundled weights.
         out: folder for the results.
     """
     from imop.demos.load import load_demonstrations
@@ -232,7 +240,7 @@ def predict(
 
     shown, recorded = (load_demonstrations(path, 1)[0] for path in (demo, query))
     with console.status(f"predicting {query}"):
-        predictions = predict_recorded(shown, recorded, method, out)
+        predictions = predict_recorded(shown, recorded, method, out, weights)
     console.print(predictions_table(predictions))
     for path in sorted(out.iterdir()):
         console.print(f"  {path}", highlight=False)

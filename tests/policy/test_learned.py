@@ -1,32 +1,21 @@
-"""The learned matcher with networks that know nothing: what holds whatever the weights are."""
+"""The learned matcher with the bundled weights, on boxes."""
 
 import numpy as np
 import pytest
-import torch
 
 from imop.geometry import se3
-from imop.networks.backbone import BackboneConfig
-from imop.networks.graph import POINT_FEATURES, GraphConfig
-from imop.networks.matching import MatchingConfig
-from imop.networks.model import Model, ModelConfig
-from imop.networks.region import GRIPPER_FEATURES, RegionConfig
+from imop.networks.model import load_model
 from imop.policy.learned import LearnedMatcher
 from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, moved, scene, transitions
 
 HOME = above(0.0, -0.3, 1.2)
 GRASP = above(0.1, 0.1, TABLE + 0.05)
 SIZE = (0.1, 0.05, 0.06)
-TINY = ModelConfig(
-    graph=GraphConfig(max_points=200),
-    region=RegionConfig(BackboneConfig(POINT_FEATURES + GRIPPER_FEATURES, (16, 16, 16)), stages=1),
-    matching=MatchingConfig(BackboneConfig(widths=(16, 16, 16)), layers=1, max_region=60),
-)
 
 
 @pytest.fixture(scope="module")
 def matcher():
-    torch.manual_seed(0)
-    return LearnedMatcher(Model(TINY).eval())
+    return LearnedMatcher(load_model())
 
 
 def steps(T=None, size=SIZE):

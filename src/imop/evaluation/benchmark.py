@@ -1,6 +1,7 @@
 """Success rates of several methods on the same demonstrations and scenes."""
 
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Any
 
 from joblib import Parallel, delayed
@@ -15,13 +16,14 @@ from imop.tasks.expert import ExpertFailed, perform
 from imop.tasks.layout import NoRoom
 from imop.types import Demonstration
 
-METHODS = ("replay", "registration", "oracle", "expert")
+METHODS = ("replay", "registration", "learned", "oracle", "expert")
 
 NOTES = (
-    "One demonstration per task and variation, from a scene that is never tested; trained on nothing.",
+    "One demonstration per task and variation, from a scene that is never tested.",
+    "The networks of learned saw synthetic pairs and base tasks with other objects; others saw nothing.",
     "Demonstrated and tested objects have the same shapes and colours; poses and clutter differ.",
-    "replay and registration see four 128 x 128 RGB-D views, camera poses, joint positions and the gripper; "
-    "no segmentation, names or object poses.",
+    "replay, registration and learned see four 128 x 128 RGB-D views, camera poses, joint positions and "
+    "the gripper; no segmentation, names or object poses.",
     "oracle carries the demonstrated poses over by the true object pose; expert reads everything.",
     "A motion that cannot be planned ends the episode as failed.",
 )
@@ -37,6 +39,7 @@ def evaluate_suite(
     instance: int,
     jobs: int,
     console: Console,
+    weights: Path | None = None,
 ) -> Results:
     """Try every method in the same `episodes` scenes of every task.
 
@@ -48,7 +51,7 @@ def evaluate_suite(
     trials = suite_trials(suite, split, tasks, episodes, seed, instance)
     every = [trial for of_task in trials.values() for trial in of_task]
     shown = _demonstrations(every, jobs, console)
-    work = [delayed(outcomes)(trial, shown[_shared(trial)], methods) for trial in every]
+    work = [delayed(outcomes)(trial, shown[_shared(trial)], methods, weights) for trial in every]
     results = dict(zip(every, parallel(work, jobs, console, "episodes"), strict=True))
     counts = {
         method: {
@@ -60,15 +63,17 @@ def evaluate_suite(
     return Results(suite, ",".join(tasks) or split, seed, counts, NOTES)
 
 
-def outcomes(trial: Trial, demonstration: Demonstration, methods: Iterable[str]) -> dict[str, bool]:
+def outcomes(
+    trial: Trial, demonstration: Demonstration, methods: Iterable[str], weights: Path | None = None
+) -> dict[str, bool]:
     """Success of each method in one scene; empty if the objects of the scene find no place."""
     try:
-        return {method: _succeeds(trial, demonstration, method) for method in methods}
+        return {method: _succeeds(trial, demonstration, method, weights) for method in methods}
     except NoRoom:
         return {}
 
 
-def _succeeds(trial: Trial, demonstration: Demonstration, method: str) -> bool:
+def _succeeds(trial: Trial, demonstration: Demonstration, method: str, weights: Path | None) -> bool:
     env = trial.env()
     if method == "expert":
         try:
@@ -76,7 +81,7 @@ def _succeeds(trial: Trial, demonstration: Demonstration, method: str) -> bool:
         except ExpertFailed:
             return False
         return True
-    policy = make_policy(method, env.world)
+    policy = make_policy(method, env.world, weights=weights)
     try:
         policy.watch(demonstration if method == "oracle" else demonstration.stripped())
         return rollout(env, policy, len(demonstration)).success

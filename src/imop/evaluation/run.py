@@ -45,6 +45,7 @@ def perform(
     out: Path,
     min_confidence: float = 0.0,
     video: bool = True,
+    weights: Path | None = None,
 ) -> Rollout:
     """Let a method that was shown `demonstration` act in the trial's scene.
 
@@ -54,7 +55,7 @@ def perform(
         ImopError: if the demonstration or the scene cannot be used.
     """
     env = trial.env()
-    policy = make_policy(method, env.world, min_confidence)
+    policy = make_policy(method, env.world, min_confidence, weights)
     policy.watch(demonstration if method == "oracle" else demonstration.stripped())
     film = _Film()
     env.on_frame = film if video else None
@@ -95,14 +96,18 @@ def steps_table(result: Rollout) -> Table:
 
 
 def predict_recorded(
-    demonstration: Demonstration, recorded: Demonstration, method: str, out: Path
+    demonstration: Demonstration,
+    recorded: Demonstration,
+    method: str,
+    out: Path,
+    weights: Path | None = None,
 ) -> list[Prediction]:
     """Predict every keyframe of `recorded` and write result.json and steps.png into `out`.
 
     Raises:
         ImopError: if either recording cannot be used.
     """
-    policy = make_policy(method)
+    policy = make_policy(method, weights=weights)
     policy.watch(demonstration.stripped())
     predictions = predict(policy, recorded)
     steps = [

@@ -89,7 +89,7 @@ def suite_trials(
 
 
 def make_policy(
-    method: str, world: World | None = None, min_confidence: float = 0.0, weights: Path = BUNDLED
+    method: str, world: World | None = None, min_confidence: float = 0.0, weights: Path | None = None
 ) -> Policy:
     """A fresh policy by the name of its method.
 
@@ -97,7 +97,7 @@ def make_policy(
         method: learned, replay, registration or oracle.
         world: the simulated world, which only the oracle reads.
         min_confidence: of the one-shot policies.
-        weights: folder of the learned policy's weights.
+        weights: folder of the learned policy's weights; by default the bundled ones.
 
     Raises:
         InvalidInput: for an unknown method, or an oracle without a world.
@@ -108,7 +108,7 @@ def make_policy(
     if method == "registration":
         return OneShotPolicy(RegistrationMatcher(), perception, min_confidence=min_confidence)
     if method == "learned":
-        return OneShotPolicy.from_pretrained(weights, perception, min_confidence)
+        return OneShotPolicy.from_pretrained(weights or BUNDLED, perception, min_confidence)
     if method == "oracle" and world is not None:
         return OraclePolicy(world)
     raise InvalidInput("method", method, "learned, replay, registration, or (in simulation) oracle")

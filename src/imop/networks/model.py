@@ -68,7 +68,7 @@ PAPER = ModelConfig(
     ),
     route_graph=GraphConfig(voxel=0.01, plane_voxel=0.04, max_points=2000, grids=(0.03, 0.08), neighbours=16),
 )
-"""The paper's size, 80.8 M parameters in all within 2 %; how they are spread over the networks it does not say."""
+"""The paper's size, 80.8 M parameters within 2 %; how they are spread over the networks it does not say."""
 
 
 class Model(nn.Module):

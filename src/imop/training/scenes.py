@@ -29,11 +29,13 @@ class Scene:
         stage: the things.
         kinds: (things,) equal numbers are indistinguishable things.
         recipe: the steps.
+        families: (things,) names.
     """
 
     stage: Stage
     kinds: tuple[int, ...]
     recipe: Recipe
+    families: tuple[str, ...] = ()
 
 
 class _Cast:
@@ -55,6 +57,11 @@ class _Cast:
         self.things.append(thing)
         self._seeds.append(seeds)
         return len(self.things) - 1
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Their families."""
+        return tuple(name for name, _, _ in self._seeds)
 
     def where(self, wanted: str) -> int:
         """Add a random thing that has some of the attribute `wanted`."""
@@ -111,7 +118,7 @@ def draw_scene(
     recipe = recipes[0]
     for other in recipes[1:]:
         recipe = recipe.then(other)
-    return Scene(stage, tuple(cast.kinds), recipe)
+    return Scene(stage, tuple(cast.kinds), recipe, cast.names[: len(cast.things)])
 
 
 def _recipe(stage: Stage, part: tuple[str, int, int, int], rng: np.random.Generator) -> Recipe:
