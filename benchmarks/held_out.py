@@ -14,7 +14,7 @@ import shlex
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +36,7 @@ from imop.policy.registration import RegistrationMatcher
 from imop.sim.robot import panda_self_filter
 from imop.training.depth_noise import DepthNoise
 from imop.training.families import HELD_OUT
+from imop.training.families.thing import TURNS, revolution
 from imop.training.pairs import StepPair
 from imop.training.scenes import Scene, demonstrate, draw_scene
 from imop.training.stage import Unreachable
@@ -143,6 +144,17 @@ def nearest_right(T: FloatArray, pair: StepPair) -> tuple[float, float]:
     return float(position[best]), float(rotation[best])
 
 
+def with_every_turn(scene: Scene, shown: Take, k: int, pair: StepPair) -> StepPair:
+    """The pair with turns of 2 degrees where a surface of revolution has, for training, turns of 30."""
+    action = scene.recipe.steps[k]
+    turns = scene.stage.things[action.thing].symmetry
+    if action.link != "body" or len(turns) != TURNS or not np.allclose(turns, revolution()):
+        return pair
+    axis = shown.poses[k][action.thing, "body"]
+    spun = axis @ revolution(180) @ se3.invert(axis)
+    return replace(pair, T_query_support=(pair.T_query_support[:, None] @ spun).reshape(-1, 4, 4))
+
+
 def iou(region: FloatArray, truth: FloatArray) -> float:
     """Of two subsets of one cloud."""
     both = within(region, truth, 1e-6).sum()
@@ -159,7 +171,7 @@ def scene_rows(number: int, seed: int, methods: tuple[str, ...], weights: Path) 
     except Unreachable:
         return []
     made = [(k, make_pair(scene, shown, asked, k)) for k in range(len(scene.recipe.steps))]
-    pairs = [(k, pair) for k, pair in made if pair is not None]
+    pairs = [(k, with_every_turn(scene, shown, k, pair)) for k, pair in made if pair is not None]
     steps = transitions(shown, watched)
     queries = [Seen(observation, plain(asked, k)) for k, observation in enumerate(seen)]
     rows: list[Row] = []
