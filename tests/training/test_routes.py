@@ -10,7 +10,7 @@ from imop.networks.routing import UNKNOWN
 from imop.training.families import TRAINING
 from imop.training.generate import generate
 from imop.training.mishaps import mishaps
-from imop.training.route_batch import QUERIES, collate_routes, make_route_sample
+from imop.training.route_batch import QUERIES, collate_routes, in_vain, make_route_sample
 from imop.training.route_shards import RouteShard, write_routes
 from imop.training.routes import Query, Route, Seen, indistinguishable, synthetic_routes
 from imop.training.scenes import demonstrate, draw_scene
@@ -150,3 +150,23 @@ def test_a_batch_keeps_routes_apart():
     assert batch.of.tolist() == [0] * 4 + [1] * 3
     assert batch.right.shape == (7, 3) and not batch.right[4:, 2].any()
     assert batch.shown.graph.size == 5 and batch.query.graph.size == 7
+
+
+def test_a_grasp_in_vain_shows_the_scene_before_it_and_an_empty_hand():
+    """Opening per state: open, open, closed on something, closed on it, open again."""
+    openings = (1.0, 1.0, 0.3, 0.3, 1.0)
+    states = tuple(seen(i, opening) for i, opening in enumerate(openings))
+    asked = [seen(20 + i, opening) for i, opening in enumerate(openings)]
+    queries = tuple(Query(s, i, np.arange(5) == i) for i, s in enumerate(asked))
+    scenes = [asked[i].cloud for i in (0, 1)]
+    found = [in_vain(Route(states, queries), np.random.default_rng(s)) for s in range(20)]
+    assert {query.expected for query in found} == {3, 4}
+    for query in found:
+        assert any(query.seen.cloud is cloud for cloud in scenes)
+        assert query.seen.opening == (0.0 if query.expected == 3 else 1.0)
+        assert np.flatnonzero(query.right).tolist() == [0]
+
+
+def test_without_a_grasp_nothing_is_in_vain():
+    states = tuple(seen(i, 0.0) for i in range(4))
+    assert in_vain(Route(states, (Query(seen(9), 0, np.arange(4) == 0),)), np.random.default_rng(0)) is None

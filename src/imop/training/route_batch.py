@@ -1,13 +1,14 @@
 """Routes as tensors: a demonstration and some of its queries make a sample, samples side by side a batch."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from imop.geometry.cloud import PointCloud
 from imop.networks.graph import Graph, GraphConfig, build_graph, collate
 from imop.networks.routing import UNKNOWN, States, make_states
 from imop.training.augment import other_light
@@ -15,7 +16,10 @@ from imop.training.routes import Query, Route, Seen
 
 QUERIES = 8
 """How many queries of a route make a training sample."""
+IN_VAIN = 0.3
+"""How many training queries are made of two states."""
 LIGHT, LIGHT_NOISE = 0.25, 0.05
+OPEN, EMPTY = 0.9, 0.03
 POSITION_NOISE, OPENING_NOISE = 0.002, 0.01
 
 
@@ -76,6 +80,7 @@ def make_route_sample(
     if rng is not None:
         light = int(rng.integers(2**32))
         queries = [queries[i] for i in rng.permutation(len(queries))[:QUERIES]]
+        queries = [in_vain(route, rng) or q if rng.random() < IN_VAIN else q for q in queries]
         expected = [_expected(query, rng) for query in queries]
     return RouteSample(
         _states(route.states, list(range(len(route.states))), config, light, rng),
@@ -92,7 +97,7 @@ def _states(
     rng: np.random.Generator | None,
 ) -> States:
     """States as tensors; with `rng` in other light (of the number `light`) and with other readings."""
-    graphs = [graph_of(s, config) for s in seen]
+    graphs = [graph_of(s.cloud, config) for s in seen]
     poses, opening = np.stack([s.T_world_gripper for s in seen]), np.array([s.opening for s in seen])
     if rng is not None:
         graphs = [other_light(g, np.random.default_rng(light), LIGHT) for g in graphs]
@@ -102,10 +107,41 @@ def _states(
     return make_states(graphs, poses, opening.tolist(), steps)
 
 
+def in_vain(route: Route, rng: np.random.Generator) -> Query | None:
+    """A grasp that got nothing: the scene as before it, and the gripper where it went then.
+
+    Clouds do not show the robot, so that the cloud of one state and the gripper of another make a state of
+    their own. It calls for the approach before the grasp. None if the demonstration has no grasp.
+    """
+    openings = [state.opening for state in route.states]
+    opened = [opening > OPEN for opening in openings]
+    grasps = [
+        k
+        for k in range(1, len(opened) - 2)
+        if opened[k - 1] and opened[k] and EMPTY < openings[k + 1] <= OPEN
+    ]
+    if not grasps:
+        return None
+    k = int(rng.choice(grasps))
+    last = next((j for j in range(k + 1, len(opened)) if opened[j]), len(opened) - 1)
+    j = int(rng.integers(k + 2, max(last, k + 2) + 1))
+    asked: dict[int, list[Query]] = {}
+    for query in route.queries:
+        asked.setdefault(query.expected if query.expected < len(opened) else -1, []).append(query)
+    scenes = [q for step in (k - 1, k) for q in asked.get(step, []) if q.right[step]]
+    grippers = [q for q in asked.get(j, []) if q.right[j]]
+    if not scenes or not grippers:
+        return None
+    before, later = scenes[int(rng.integers(len(scenes)))], grippers[int(rng.integers(len(grippers)))]
+    opening = later.seen.opening if later.seen.opening > OPEN else 0.0
+    state = replace(before.seen, T_world_gripper=later.seen.T_world_gripper, opening=opening)
+    return Query(state, j, np.arange(len(opened)) == k - 1)
+
+
 @lru_cache(maxsize=50_000)
-def graph_of(seen: Seen, config: GraphConfig) -> Graph:
-    """The graph of a state's cloud; searching takes longer than learning, so the last ones are kept."""
-    return build_graph(seen.cloud, config)
+def graph_of(cloud: PointCloud, config: GraphConfig) -> Graph:
+    """The graph of a cloud; searching takes longer than learning, so the last ones are kept."""
+    return build_graph(cloud, config)
 
 
 def _expected(query: Query, rng: np.random.Generator) -> float:
