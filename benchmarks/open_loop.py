@@ -51,8 +51,8 @@ class Options:
         split: which of its tasks.
         tasks: comma-separated names within the suite; all of the split by default.
         demos: a folder in RLBench's layout instead of a suite: an episode, a task, or several tasks.
-        methods: comma-separated: learned, registration, replay, oracle. By default all but learned, and no
-            oracle on recordings, which do not tell where objects are.
+        methods: comma-separated: learned, registration, replay, oracle. By default all, but no oracle on
+            recordings, which do not tell where objects are.
         scenes: per task, with its variations in turn.
         seed: of the first scene.
         instance: seed of the objects.
@@ -192,7 +192,9 @@ def measure(options: Options, console: Console) -> dict[str, dict[str, Any]]:
     Raises:
         ImopError: for options that do not fit, or recordings that cannot be used.
     """
-    methods = (options.methods or f"registration,replay{'' if options.demos else ',oracle'}").split(",")
+    methods = (options.methods or f"learned,registration,replay{'' if options.demos else ',oracle'}").split(
+        ","
+    )
     if options.demos and "oracle" in methods:
         raise InvalidInput("methods", "oracle", "methods that need no object poses, for recordings")
     for method in methods:
