@@ -4,7 +4,7 @@ The network says how well each demonstrated state fits what is seen, without bei
 episode says what is to be expected, as odds:
 
 - the step after the one taken last: 1;
-- any step before that, since an action can fail: `back`;
+- a step before that, since an action can fail: `back`, and for each step farther back times `farther`;
 - any step after it, since what a step would do may be done already: `skip`;
 - the same in another demonstration than the one followed so far: times `change`.
 
@@ -32,14 +32,16 @@ class Odds:
     """How likely the steps are before anything is seen, against the expected one.
 
     Attributes:
-        back: of an earlier step.
+        back: of the step before.
+        farther: of every step farther back, against the one after it.
         skip: of a later step.
         change: of another demonstration than the one followed so far.
         retries: how often a step may be done again.
     """
 
-    back: float = 0.01
-    skip: float = 0.0005
+    back: float = 0.1
+    farther: float = 0.7
+    skip: float = 0.001
     change: float = 0.05
     retries: int = 2
 
@@ -96,7 +98,8 @@ class LearnedRouter:
         odds, steps = self._odds, np.arange(length)
         followed, last = self._last or (number, -1)
         expected = min(last + 1, length - 1)
-        prior = np.where(steps < expected, odds.back, np.where(steps > expected, odds.skip, 1.0))
+        back = odds.back * odds.farther ** np.maximum(expected - steps - 1, 0)
+        prior = np.where(steps < expected, back, np.where(steps > expected, odds.skip, 1.0))
         worn = np.array([self._taken[number, int(step)] > odds.retries for step in steps])
         prior[worn & (steps != expected)] = 1e-12
         return prior * (1.0 if number == followed else odds.change)
