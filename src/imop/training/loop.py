@@ -6,6 +6,8 @@ python -m imop.training.loop --out runs/routing --networks routing --routes PATH
 
 import json
 import math
+import shlex
+import sys
 import time
 from collections.abc import Callable, Iterator
 from itertools import repeat
@@ -213,10 +215,24 @@ def _report(config: TrainConfig, state: TrainState, recent: list[dict[str, float
             for name, value in metrics.items():
                 writer.add_scalar(f"{source}/{name}", value, state.step)
     state.save(config.out / CHECKPOINT)
-    card = {"step": state.step, "seed": config.seed, "losses": means, "validation": found}
-    save_model(average, config.out, card)
+    save_model(
+        average, config.out, _card(config) | {"step": state.step, "losses": means, "validation": found}
+    )
     numbers = {**means, **{f"{f} {n}": v for f, metrics in found.items() for n, v in metrics.items()}}
     return f"step {state.step}: " + ", ".join(f"{n} {v:.3f}" for n, v in numbers.items())
+
+
+def _card(config: TrainConfig) -> dict[str, Any]:
+    """What went into the weights, as far as it is known before training."""
+    return {
+        "data": [folder.name for folder in (*config.train, *config.routes)],
+        "shares": list(config.shares),
+        "networks": list(config.networks),
+        "batch": config.batch,
+        "seed": config.seed,
+        "command": shlex.join(sys.argv),
+        "licence": "MIT",
+    }
 
 
 def _moving_average(decay: float) -> Callable[..., None]:
