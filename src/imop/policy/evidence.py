@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud, farthest_points
+from imop.geometry.cloud import PointCloud, concatenate, farthest_points
 from imop.policy.matcher import Hypothesis
 from imop.types import BoolArray, CameraView, Float32Array, FloatArray
 
@@ -27,6 +27,7 @@ class Tolerances:
         hidden: what a point that no camera can see costs, as a share of an unexplained one.
         around: observed points this near to the moved region have to be explained by it, metres.
         backward: share of the score that these points decide.
+        context: share of the forward score that the region's surroundings decide.
     """
 
     reach: float = 0.015
@@ -38,6 +39,7 @@ class Tolerances:
     hidden: float = 0.5
     around: float = 0.04
     backward: float = 0.25
+    context: float = 0.2
 
 
 def shades(colors: Float32Array) -> FloatArray:
@@ -54,9 +56,14 @@ class Surface:
     ) -> None:
         self.cloud = cloud
         self.tolerances = tolerances or Tolerances()
+        self._given = views
         self._views = [(se3.invert(view.T_world_camera), view) for view in views.values()]
         self._tree = cKDTree(cloud.points) if len(cloud) else None
         self._shades = shades(cloud.colors)
+
+    def joined(self, cloud: PointCloud) -> "Surface":
+        """This surface and another part of the same scene."""
+        return Surface(concatenate([self.cloud, cloud]), self._given, self.tolerances)
 
     def explain(self, cloud: PointCloud, T: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
         """(M,) how well this surface explains points of a `cloud` with normals moved by `T`, 0 .. 1.
@@ -147,14 +154,31 @@ class Judge:
         region: the region with the views of the demonstrated scene.
         weight: (M,) of its points.
         query: the observed scene.
+        context: what stood around the region, if that counts.
     """
 
-    def __init__(self, region: Surface, weight: FloatArray, query: Surface) -> None:
+    def __init__(
+        self, region: Surface, weight: FloatArray, query: Surface, context: PointCloud | None = None
+    ) -> None:
         self._region, self._query = region, query
-        coarse, fine = (farthest_points(region.cloud.points, count) for count in (120, 1000))
-        self._coarse, self._coarse_weight = region.cloud.select(coarse), weight[coarse]
-        self._fine, self._fine_weight = region.cloud.select(fine), weight[fine]
+        self._whole = region if context is None else region.joined(context)
+        self._coarse, self._coarse_weight = self._with_context(weight, context, 120)
+        self._fine, self._fine_weight = self._with_context(weight, context, 1000)
+        self._size = min(1000, len(region.cloud))
         self._around = query.cloud.select(farthest_points(query.cloud.points, 1000))
+
+    def _with_context(
+        self, weight: FloatArray, context: PointCloud | None, count: int
+    ) -> tuple[PointCloud, FloatArray]:
+        """At most `count` points of the region and half as many of its context, and their weights."""
+        chosen = farthest_points(self._region.cloud.points, count)
+        cloud, weight = self._region.cloud.select(chosen), weight[chosen]
+        if context is None:
+            return cloud, weight
+        near = context.select(farthest_points(context.points, count // 2))
+        share = self._query.tolerances.context
+        each = share / (1 - share) * weight.sum() / len(near)
+        return concatenate([cloud, near]), np.concatenate([weight, np.full(len(near), each)])
 
     def glance(self, T_query_support: FloatArray) -> FloatArray:
         """(H,) quick forward scores, 0 .. 1, of motions (H, 4, 4)."""
@@ -172,12 +196,12 @@ class Judge:
         forward = self._query.share(self._fine, self._fine_weight, T_query_support, explained)
         part = self._query.tolerances.backward
         score = (1 - part) * forward + part * self._backward(se3.invert(T_query_support))
-        good = explained > 0.3
+        good = np.flatnonzero(explained[: self._size] > 0.3)
         p_query = self._query.cloud.points[counterpart[good]]
         return Hypothesis(T_query_support, score, self._fine.points[good], p_query)
 
     def _backward(self, T_support_query: FloatArray) -> float:
         near = self._region.near(se3.apply(T_support_query, self._around.points))
         around = self._around.select(near)
-        explained, _ = self._region.explain(around, T_support_query)
-        return self._region.share(around, np.ones(len(around)), T_support_query, explained)
+        explained, _ = self._whole.explain(around, T_support_query)
+        return self._whole.share(around, np.ones(len(around)), T_support_query, explained)

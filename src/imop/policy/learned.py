@@ -30,6 +30,8 @@ from imop.types import FloatArray
 
 # A region of fewer points cannot be matched.
 FEWEST = 8
+# What stands this near to the region (metres) is its context.
+AROUND = 0.1
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class LearnedMatcher:
     samples: int = 4000
     places: int = 2
     turns: int = 24
-    search: SearchConfig = field(default_factory=lambda: SearchConfig(refined=4, finished=2, righted=3))
+    search: SearchConfig = field(default_factory=lambda: SearchConfig(refined=6, finished=2, righted=3))
     seed: int = 0
 
     def prepare(self, steps: Sequence[Transition]) -> list["LearnedStep"]:
@@ -79,6 +81,9 @@ class LearnedStep:
         few = farthest_points(before.points[inside].double().numpy(), model.config.matching.max_region)
         self._graph, self._chosen = before, inside[torch.from_numpy(few).sort().values]
         self._probability = probability[self._chosen].double().numpy()
+        self._middles = [middle(self.region)]
+        if self._region.context is not None:
+            self._middles.append(middle(np.concatenate([self.region, self._region.context.points])))
         self._search = Search(matcher.search, step.before, self._region)
 
     def _inside(self, probability: Tensor) -> Tensor:
@@ -136,8 +141,8 @@ class LearnedStep:
             if w.sum() > 0.1 * m.weight.sum():
                 x, y = (np.average(points, axis=0, weights=w) for points in (m.x, m.y))
                 seeds.append(upright_motions(x, y[None], self._matcher.turns))
-                place = middle(things.points[labels == label])
-                seeds.append(upright_motions(middle(self.region), place[None], self._matcher.turns))
+                place = middle(things.points[labels == label])[None]
+                seeds += [upright_motions(center, place, self._matcher.turns) for center in self._middles]
         return np.concatenate(seeds)
 
 
@@ -172,10 +177,14 @@ def _dense(
     owner = nearest(cloud.points, graph.points.double().numpy())[1][:, 0]
     member = weight[owner] > 0
     # The bare table is found everywhere.
-    standing = member & ~step.before.ground.bare
-    member = standing if standing.sum() >= FEWEST else member
+    standing = ~step.before.ground.bare
+    member = member & standing if (member & standing).sum() >= FEWEST else member
     region = cloud.select(member)
     p_held = se3.apply(step.before.observation.T_world_gripper, p_gripper_held)
     if len(p_held) and within(p_held, region.points, SAME).mean() > 0.5:
-        p_gripper_held = p_gripper_held[:0]
-    return Region(region, weight[owner[member]], p_gripper_held)
+        p_held, p_gripper_held = p_held[:0], p_gripper_held[:0]
+    rest = cloud.select(standing & ~member)
+    around = within(rest.points, region.points, AROUND)
+    around &= ~within(rest.points, p_held, SAME) if len(p_held) else True
+    context = rest.select(around) if around.any() else None
+    return Region(region, weight[owner[member]], p_gripper_held, context)

@@ -39,11 +39,14 @@ class Region:
         weight: (M,) in (0, 1], larger near the contact.
         p_gripper_held: (H, 3) points of the held object in the gripper's frame, if it is not part of the
             region; they have to be left out of the query as well.
+        context: what stood around the region. It may have moved on its own, so it only tells apart what the
+            region alone does not: the two ends of a box without its latch.
     """
 
     cloud: PointCloud
     weight: FloatArray
     p_gripper_held: FloatArray
+    context: PointCloud | None = None
 
 
 def find_regions(steps: Sequence[Transition]) -> list[Region]:

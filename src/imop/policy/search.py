@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud, farthest_points
+from imop.geometry.cloud import PointCloud, concatenate, farthest_points
 from imop.geometry.neighbours import within
 from imop.policy.contacts import SAME
 from imop.policy.evidence import Judge, Surface
@@ -59,7 +59,11 @@ class Search:
         self._surface = Surface(region.cloud, before.observation.views)
         self._center = region.cloud.points.mean(axis=0)
         self._T_world_gripper = before.observation.T_world_gripper
-        self._coarse = region.cloud.points[farthest_points(region.cloud.points, 400)]
+        self._coarse = [region.cloud.points[farthest_points(region.cloud.points, 400)]]
+        if region.context is not None:
+            # A thin part slides along itself; what it is fixed to holds it.
+            whole = concatenate([region.cloud, region.context]).points
+            self._coarse.append(whole[farthest_points(whole, 600)])
         self._fine = region.cloud.points[farthest_points(region.cloud.points, 1500)]
 
     def without_held(self, query: Scene, cloud: PointCloud) -> PointCloud:
@@ -80,7 +84,8 @@ class Search:
             seeds: (H, 4, 4) motions to begin with.
             hints: motions (4, 4) that are tried in any case.
         """
-        judge = Judge(self._surface, self._region.weight, Surface(things, query.observation.views))
+        seen = Surface(things, query.observation.views)
+        judge = Judge(self._surface, self._region.weight, seen, self._region.context)
         T_repeated = query.observation.T_world_gripper @ se3.invert(self._T_world_gripper)
         likely = np.stack([*hints, np.eye(4), T_repeated])
         order = np.argsort(-judge.glance(seeds), kind="stable")
@@ -97,7 +102,7 @@ class Search:
         """The likely motions as they are, all motions refined, and all of these set upright."""
         refine = Refiner(things.points)
         found = [judge.judge(T) for T in likely]
-        found += [judge.judge(refine(self._coarse, T)) for T in [*likely, *seeds]]
+        found += [judge.judge(refine(part, T)) for part in self._coarse for T in [*likely, *seeds]]
         found.sort(key=lambda hypothesis: -hypothesis.score)
         # Many seeds end in the same place.
         motions = np.stack([hypothesis.T_query_support for hypothesis in found])
