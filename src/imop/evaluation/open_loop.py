@@ -211,7 +211,7 @@ def _answer(
 def _repeats(shown: Keyframe, asked: Keyframe, right: FloatArray) -> bool:
     motion = se3.invert(shown.observation.T_world_gripper) @ shown.action.T_world_gripper
     position, rotation = errors(asked.observation.T_world_gripper @ motion, right)
-    return position < COARSE[0] and rotation < np.radians(COARSE[1])
+    return bool(position < COARSE[0] and rotation < np.radians(COARSE[1]))
 
 
 def _compared(row: Row, action: Action, right: FloatArray) -> Row:
