@@ -84,7 +84,7 @@ def test_routing_takes_any_right_step():
 
 
 def test_pose_by_hand():
-    """5 cm are one unit; half a turn changes two columns by 2 each, so |dR| = sqrt(8), and 0.5 is one unit."""
+    """5 cm are one unit; half a turn changes two columns by 2 each: |dR| = sqrt(8); and 0.5 is one unit."""
     right = torch.eye(4)[None]
     shifted = torch.eye(4)[None].clone()
     shifted[0, 0, 3] = 0.05
