@@ -55,7 +55,9 @@ class LearnedMatcher:
     samples: int = 4000
     places: int = 2
     turns: int = 24
-    search: SearchConfig = field(default_factory=lambda: SearchConfig(refined=6, finished=2, righted=3))
+    search: SearchConfig = field(
+        default_factory=lambda: SearchConfig(refined=6, finished=2, righted=3, turned=2)
+    )
     seed: int = 0
 
     def prepare(self, steps: Sequence[Transition]) -> list["LearnedStep"]:

@@ -32,6 +32,7 @@ class SearchConfig:
         refined: how many seeds are refined by closest points.
         finished: how many of the refined motions get the finest stage too.
         righted: how many of the best are set upright, too.
+        turned: how many of the best are tried half a turn off, too: long things have two ends.
         turn: share of its score that a hypothesis loses for half a turn off the demonstrated motion.
         tilt: share that it loses for tilting things by `TILTED` or more.
         change: share that it loses for another place than the demonstrated motion leads to.
@@ -40,6 +41,7 @@ class SearchConfig:
     refined: int = 12
     finished: int = 4
     righted: int = 12
+    turned: int = 0
     turn: float = 0.03
     tilt: float = 0.35
     change: float = 0.12
@@ -104,6 +106,9 @@ class Search:
         found = [judge.judge(T) for T in likely]
         found += [judge.judge(refine(part, T)) for part in self._coarse for T in [*likely, *seeds]]
         found.sort(key=lambda hypothesis: -hypothesis.score)
+        ends = [self._half_turn(h.T_query_support) for h in found[: self._config.turned]]
+        found += [judge.judge(refine(part, T)) for part in self._coarse for T in ends]
+        found.sort(key=lambda hypothesis: -hypothesis.score)
         # Many seeds end in the same place.
         motions = np.stack([hypothesis.T_query_support for hypothesis in found])
         found = [found[i] for i in distinct(motions, self._center, len(found), *SAME_MOTION)]
@@ -113,6 +118,12 @@ class Search:
         found.sort(key=lambda hypothesis: -hypothesis.score)
         best = found[: self._config.righted]
         return found + [judge.judge(upright(h.T_query_support, self._center)) for h in best]
+
+    def _half_turn(self, T: FloatArray) -> FloatArray:
+        """The motion, then half a turn about the vertical through the middle of what it moved."""
+        p = se3.apply(T, middle(self._coarse[-1])[None])[0]
+        R = se3.euler(z=np.pi)
+        return se3.make(R, p - R @ p) @ T
 
     def _preference(self, hypothesis: Hypothesis, T_repeated: FloatArray, begun: bool) -> float:
         """The score, less for moving otherwise than demonstrated and for tilting what stands on a table.
