@@ -26,6 +26,7 @@ from rich.table import Table
 
 from imop.evaluation.statistics import wilson
 from imop.geometry import se3
+from imop.geometry.cloud import PointCloud
 from imop.geometry.neighbours import within
 from imop.geometry.perception import Perception
 from imop.networks.model import BUNDLED, load_model
@@ -99,10 +100,9 @@ def transitions(take: Take, observations: list[Observation]) -> list[Transition]
     return [Transition(a, b, action) for a, b, action in zip(seen, seen[1:], actions, strict=False)]
 
 
-def plain(take: Take, k: int):
+def plain(take: Take, k: int) -> PointCloud:
     """The cloud of a state without the ids that only the truth needs."""
-    cloud = take.clouds[k]
-    return type(cloud)(cloud.points, cloud.colors, cloud.camera, cloud.normals)
+    return replace(take.clouds[k], ids=None)
 
 
 def predict(

@@ -4,22 +4,26 @@ import numpy as np
 import pytest
 
 from imop.geometry import se3
-from imop.policy.evidence import Judge, Surface, shades
+from imop.policy.evidence import Judge, Surface, Template, shades
+from imop.policy.region import Region
 from tests.policy.scenes import GREEN, RED, at, box, camera, moved
 
 SIZE = (0.08, 0.05, 0.06)
 VIEWS = {"top": camera()}
 
 
+def template(region):
+    return Template(Region(region, np.ones(len(region)), np.zeros((0, 3))), VIEWS)
+
+
 def judged(region, query, T, views=VIEWS):
-    surface = Surface(region, VIEWS)
-    return Judge(surface, np.ones(len(region)), Surface(query, views)).judge(T).score
+    return Judge(template(region), Surface(query, views)).judge(T).score
 
 
 def test_the_true_motion_explains_everything_and_brings_its_pairs(rng):
     region, T = box(SIZE, RED), at(0.2, 0.1, yaw=1.0)
     query = moved(box(SIZE, RED, seed=1), T)
-    judge = Judge(Surface(region, VIEWS), np.ones(len(region)), Surface(query, VIEWS))
+    judge = Judge(template(region), Surface(query, VIEWS))
     found = judge.judge(T)
     assert found.score > 0.9 and judge.glance(T[None])[0] > 0.85
     pairs = se3.apply(T, found.p_support) - found.p_query

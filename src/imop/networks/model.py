@@ -10,7 +10,7 @@ from typing import Any
 import dacite
 from safetensors import SafetensorError
 from safetensors.torch import load, save
-from torch import nn
+from torch import Tensor, nn
 
 from imop.errors import CorruptData
 from imop.files import replaced
@@ -105,6 +105,12 @@ def save_model(model: Model, folder: Path, card: Mapping[str, Any]) -> None:
     }
     with replaced(folder / CARD) as temporary:
         temporary.write_text(json.dumps({**card, **known}, indent=2) + "\n")
+
+
+def part_of(weights: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
+    """The weights of the module `prefix`, by their names within it."""
+    start = f"{prefix}."
+    return {name.removeprefix(start): w for name, w in weights.items() if name.startswith(start)}
 
 
 BUNDLED = Path(__file__).parents[1] / "weights"

@@ -61,6 +61,13 @@ class StepBatch:
         return StepBatch(self.before.to(device), self.after.to(device), *(t.to(device) for t in rest))
 
 
+def cross_neighbours(before: Graph, after: Graph, k: int) -> tuple[Tensor, Tensor]:
+    """(M, k) for each point of s_i its nearest of s_i', and (M', k) the other way round; of single clouds."""
+    p_before, p_after = (g.points.cpu().double().numpy() for g in (before, after))
+    forth, back = nearest_neighbours(p_before, p_after, k), nearest_neighbours(p_after, p_before, k)
+    return torch.from_numpy(forth), torch.from_numpy(back)
+
+
 def one_step(before: Graph, after: Graph, poses: Tensor, gripper: Tensor, neighbours: int) -> StepBatch:
     """A batch of one step.
 
@@ -71,10 +78,8 @@ def one_step(before: Graph, after: Graph, poses: Tensor, gripper: Tensor, neighb
         gripper: (2,) whether it is open in s_i, and after the action.
         neighbours: K of the cross attention.
     """
-    p_before, p_after = (g.points.cpu().double().numpy() for g in (before, after))
-    cross = torch.from_numpy(nearest_neighbours(p_before, p_after, neighbours))
-    cross_back = torch.from_numpy(nearest_neighbours(p_after, p_before, neighbours))
-    return StepBatch(before, after, poses[:1], poses[1:], gripper[None], cross, cross_back)
+    cross = cross_neighbours(before, after, neighbours)
+    return StepBatch(before, after, poses[:1], poses[1:], gripper[None], *cross)
 
 
 class RegionNetwork(nn.Module):

@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, concatenate, farthest_points
 from imop.policy.matcher import Hypothesis
+from imop.policy.region import Region
 from imop.types import BoolArray, CameraView, Float32Array, FloatArray
 
 
@@ -56,14 +57,9 @@ class Surface:
     ) -> None:
         self.cloud = cloud
         self.tolerances = tolerances or Tolerances()
-        self._given = views
         self._views = [(se3.invert(view.T_world_camera), view) for view in views.values()]
         self._tree = cKDTree(cloud.points) if len(cloud) else None
         self._shades = shades(cloud.colors)
-
-    def joined(self, cloud: PointCloud) -> "Surface":
-        """This surface and another part of the same scene."""
-        return Surface(concatenate([self.cloud, cloud]), self._given, self.tolerances)
 
     def explain(self, cloud: PointCloud, T: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
         """(M,) how well this surface explains points of a `cloud` with normals moved by `T`, 0 .. 1.
@@ -144,6 +140,34 @@ def moved(cloud: PointCloud, T: FloatArray) -> PointCloud:
     )
 
 
+class Template:
+    """A region ready to be judged in any query: everything that only depends on the demonstration.
+
+    Args:
+        region: of a step.
+        views: of the demonstrated scene.
+    """
+
+    def __init__(self, region: Region, views: Mapping[str, CameraView]) -> None:
+        self.surface = Surface(region.cloud, views)
+        self.whole = self.surface if region.context is None else Surface(region.whole, views)
+        self.coarse, self.coarse_weight = self._points(region, 120)
+        self.fine, self.fine_weight = self._points(region, 1000)
+        # The fine points beyond these are of the context.
+        self.size = min(1000, len(region.cloud))
+
+    def _points(self, region: Region, count: int) -> tuple[PointCloud, FloatArray]:
+        """At most `count` points of the region and half as many of its context, and their weights."""
+        chosen = farthest_points(region.cloud.points, count)
+        cloud, weight = region.cloud.select(chosen), region.weight[chosen]
+        if region.context is None:
+            return cloud, weight
+        near = region.context.select(farthest_points(region.context.points, count // 2))
+        share = self.surface.tolerances.context
+        each = share / (1 - share) * weight.sum() / len(near)
+        return concatenate([cloud, near]), np.concatenate([weight, np.full(len(near), each)])
+
+
 class Judge:
     """Scores motions of one region into one query, in both directions.
 
@@ -151,39 +175,18 @@ class Judge:
     was observed around it, which tells a thing from a larger one and a front with handles from a back.
 
     Args:
-        region: the region with the views of the demonstrated scene.
-        weight: (M,) of its points.
+        template: of the region.
         query: the observed scene.
-        context: what stood around the region, if that counts.
     """
 
-    def __init__(
-        self, region: Surface, weight: FloatArray, query: Surface, context: PointCloud | None = None
-    ) -> None:
-        self._region, self._query = region, query
-        self._whole = region if context is None else region.joined(context)
-        self._coarse, self._coarse_weight = self._with_context(weight, context, 120)
-        self._fine, self._fine_weight = self._with_context(weight, context, 1000)
-        self._size = min(1000, len(region.cloud))
+    def __init__(self, template: Template, query: Surface) -> None:
+        self._template, self._query = template, query
         self._around = query.cloud.select(farthest_points(query.cloud.points, 1000))
-
-    def _with_context(
-        self, weight: FloatArray, context: PointCloud | None, count: int
-    ) -> tuple[PointCloud, FloatArray]:
-        """At most `count` points of the region and half as many of its context, and their weights."""
-        chosen = farthest_points(self._region.cloud.points, count)
-        cloud, weight = self._region.cloud.select(chosen), weight[chosen]
-        if context is None:
-            return cloud, weight
-        near = context.select(farthest_points(context.points, count // 2))
-        share = self._query.tolerances.context
-        each = share / (1 - share) * weight.sum() / len(near)
-        return concatenate([cloud, near]), np.concatenate([weight, np.full(len(near), each)])
 
     def glance(self, T_query_support: FloatArray) -> FloatArray:
         """(H,) quick forward scores, 0 .. 1, of motions (H, 4, 4)."""
-        copies = moved(self._coarse, T_query_support)
-        weight = np.tile(self._coarse_weight, len(T_query_support))
+        copies = moved(self._template.coarse, T_query_support)
+        weight = np.tile(self._template.coarse_weight, len(T_query_support))
         explained, _ = self._query.explain(copies, np.eye(4))
         possible = self._query.possible(copies, weight, explained)
         got, wanted = ((v.reshape(len(T_query_support), -1)).sum(1) for v in (weight * explained, possible))
@@ -192,16 +195,17 @@ class Judge:
 
     def judge(self, T_query_support: FloatArray) -> Hypothesis:
         """The motion as a hypothesis, scored in both directions."""
-        explained, counterpart = self._query.explain(self._fine, T_query_support)
-        forward = self._query.share(self._fine, self._fine_weight, T_query_support, explained)
+        fine = self._template.fine
+        explained, counterpart = self._query.explain(fine, T_query_support)
+        forward = self._query.share(fine, self._template.fine_weight, T_query_support, explained)
         part = self._query.tolerances.backward
         score = (1 - part) * forward + part * self._backward(se3.invert(T_query_support))
-        good = np.flatnonzero(explained[: self._size] > 0.3)
+        good = np.flatnonzero(explained[: self._template.size] > 0.3)
         p_query = self._query.cloud.points[counterpart[good]]
-        return Hypothesis(T_query_support, score, self._fine.points[good], p_query)
+        return Hypothesis(T_query_support, score, fine.points[good], p_query)
 
     def _backward(self, T_support_query: FloatArray) -> float:
-        near = self._region.near(se3.apply(T_support_query, self._around.points))
+        near = self._template.surface.near(se3.apply(T_support_query, self._around.points))
         around = self._around.select(near)
-        explained, _ = self._whole.explain(around, T_support_query)
-        return self._whole.share(around, np.ones(len(around)), T_support_query, explained)
+        explained, _ = self._template.whole.explain(around, T_support_query)
+        return self._template.whole.share(around, np.ones(len(around)), T_support_query, explained)

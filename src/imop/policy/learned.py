@@ -85,7 +85,7 @@ class LearnedStep:
         self._probability = probability[self._chosen].double().numpy()
         self._middles = [middle(self.region)]
         if self._region.context is not None:
-            self._middles.append(middle(np.concatenate([self.region, self._region.context.points])))
+            self._middles.append(middle(self._region.whole.points))
         self._search = Search(matcher.search, step.before, self._region)
 
     def _inside(self, probability: Tensor) -> Tensor:

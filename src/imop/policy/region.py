@@ -8,11 +8,12 @@ repeated too often to be found again (a drawer's handle looks like the other dra
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud
+from imop.geometry.cloud import PointCloud, concatenate
 from imop.geometry.neighbours import nearest, within
 from imop.policy.contacts import SAME, Contacts, find_contacts
 from imop.policy.matcher import Transition
@@ -47,6 +48,11 @@ class Region:
     weight: FloatArray
     p_gripper_held: FloatArray
     context: PointCloud | None = None
+
+    @cached_property
+    def whole(self) -> PointCloud:
+        """The region, then its context."""
+        return self.cloud if self.context is None else concatenate([self.cloud, self.context])
 
 
 def find_regions(steps: Sequence[Transition]) -> list[Region]:

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud, concatenate, farthest_points
+from imop.geometry.cloud import PointCloud, farthest_points
 from imop.geometry.neighbours import within
 from imop.policy.contacts import SAME
-from imop.policy.evidence import Judge, Surface
+from imop.policy.evidence import Judge, Surface, Template
 from imop.policy.hypotheses import distinct
 from imop.policy.matcher import Hypothesis, Scene
 from imop.policy.refine import FINEST, Refiner, upright
@@ -58,14 +58,13 @@ class Search:
 
     def __init__(self, config: SearchConfig, before: Scene, region: Region) -> None:
         self._config, self._region = config, region
-        self._surface = Surface(region.cloud, before.observation.views)
+        self._template = Template(region, before.observation.views)
         self._center = region.cloud.points.mean(axis=0)
         self._T_world_gripper = before.observation.T_world_gripper
         self._coarse = [region.cloud.points[farthest_points(region.cloud.points, 400)]]
         if region.context is not None:
             # A thin part slides along itself; what it is fixed to holds it.
-            whole = concatenate([region.cloud, region.context]).points
-            self._coarse.append(whole[farthest_points(whole, 600)])
+            self._coarse.append(region.whole.points[farthest_points(region.whole.points, 600)])
         self._fine = region.cloud.points[farthest_points(region.cloud.points, 1500)]
 
     def without_held(self, query: Scene, cloud: PointCloud) -> PointCloud:
@@ -86,8 +85,7 @@ class Search:
             seeds: (H, 4, 4) motions to begin with.
             hints: motions (4, 4) that are tried in any case.
         """
-        seen = Surface(things, query.observation.views)
-        judge = Judge(self._surface, self._region.weight, seen, self._region.context)
+        judge = Judge(self._template, Surface(things, query.observation.views))
         T_repeated = query.observation.T_world_gripper @ se3.invert(self._T_world_gripper)
         likely = np.stack([*hints, np.eye(4), T_repeated])
         order = np.argsort(-judge.glance(seeds), kind="stable")

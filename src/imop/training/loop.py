@@ -24,7 +24,7 @@ from torch.utils.tensorboard import SummaryWriter
 
 from imop.errors import CorruptData, InvalidInput
 from imop.files import replaced
-from imop.networks.model import NETWORKS, Model, ModelConfig, save_model
+from imop.networks.model import NETWORKS, Model, ModelConfig, part_of, save_model
 from imop.training.config import TrainConfig
 from imop.training.data import PairDataset, RouteDataset, loader
 from imop.training.metrics import validate, validate_routes
@@ -71,9 +71,7 @@ class TrainState:
     def _load(self, module: nn.Module, weights: dict[str, Tensor], prefix: str) -> None:
         """Only of networks that are trained: the others may have had another shape then."""
         for name in self.networks:
-            start = f"{prefix}{name}."
-            own = {k.removeprefix(start): w for k, w in weights.items() if k.startswith(start)}
-            module.get_submodule(prefix + name).load_state_dict(own)
+            module.get_submodule(prefix + name).load_state_dict(part_of(weights, prefix + name))
 
     def save(self, path: Path) -> None:
         """Write the checkpoint, whole or not at all."""
@@ -204,10 +202,10 @@ def _report(config: TrainConfig, state: TrainState, recent: list[dict[str, float
     found = {folder.name: validate(average, folder, config.validation_pairs) for folder in config.validate}
     for folder in config.validate_routes:
         found[folder.name] = validate_routes(average, folder, config.validation_pairs)
-    record = {"step": state.step, "time": time.time(), "losses": means, "validation": found}
+    reached = {"step": state.step, "losses": means, "validation": found}
     config.out.mkdir(parents=True, exist_ok=True)
     with (config.out / LOG).open("a") as log:
-        log.write(json.dumps(record) + "\n")
+        log.write(json.dumps({**reached, "time": time.time()}) + "\n")
     with SummaryWriter(str(config.out)) as writer:
         for name, value in means.items():
             writer.add_scalar(f"loss/{name}", value, state.step)
@@ -215,9 +213,7 @@ def _report(config: TrainConfig, state: TrainState, recent: list[dict[str, float
             for name, value in metrics.items():
                 writer.add_scalar(f"{source}/{name}", value, state.step)
     state.save(config.out / CHECKPOINT)
-    save_model(
-        average, config.out, _card(config) | {"step": state.step, "losses": means, "validation": found}
-    )
+    save_model(average, config.out, _card(config) | reached)
     numbers = {**means, **{f"{f} {n}": v for f, metrics in found.items() for n, v in metrics.items()}}
     return f"step {state.step}: " + ", ".join(f"{n} {v:.3f}" for n, v in numbers.items())
 

@@ -13,7 +13,7 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file
 
 from imop.errors import CorruptData
-from imop.networks.model import CARD, NETWORKS, WEIGHTS, Model, ModelConfig, save_model
+from imop.networks.model import CARD, NETWORKS, WEIGHTS, Model, ModelConfig, part_of, save_model
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,7 @@ def merge(config: MergeConfig) -> Model:
         model = Model(dacite.from_dict(ModelConfig, known, dacite.Config(cast=[tuple], strict=True)))
         for name in taken.keys() & NETWORKS:
             weights = load_file(taken[name] / WEIGHTS)
-            own = {k.removeprefix(f"{name}."): w for k, w in weights.items() if k.startswith(f"{name}.")}
-            getattr(model, name).load_state_dict(own)
+            getattr(model, name).load_state_dict(part_of(weights, name))
     except (KeyError, dacite.DaciteError, SafetensorError, RuntimeError, TypeError, OSError) as error:
         raise CorruptData(config.pairs, f"weights and configuration do not fit ({error})") from error
     rest = {

@@ -12,8 +12,8 @@ from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, farthest_points
 from imop.geometry.neighbours import nearest
-from imop.networks.graph import Graph, GraphConfig, build_graph, collate, nearest_neighbours
-from imop.networks.region import StepBatch
+from imop.networks.graph import Graph, GraphConfig, build_graph, collate
+from imop.networks.region import StepBatch, cross_neighbours
 from imop.types import BoolArray, FloatArray, as_array, as_pose
 
 # A region point and its counterpart in the query are at most this far apart after the true motion, metres.
@@ -131,7 +131,7 @@ def make_sample(
             of the region have no target.
     """
     before, after, query = (build_graph(c, config) for c in (pair.support, pair.after, pair.query))
-    p_before, p_after = before.points.numpy().astype(np.float64), after.points.numpy().astype(np.float64)
+    p_before = before.points.numpy().astype(np.float64)
     label = pair.region[nearest(p_before, pair.support.points)[1][:, 0]]
     if not label.any():
         # The region is smaller than the grid: its nearest point stands for it.
@@ -140,15 +140,13 @@ def make_sample(
     if len(chosen) > max_region:
         chosen = np.sort(rng.choice(chosen, max_region, replace=False))
     poses = np.stack([pair.T_world_goal, pair.T_world_now]).astype(np.float32)
-    k = config.neighbours
     return Sample(
         before,
         after,
         query,
         torch.from_numpy(poses),
         torch.tensor(pair.gripper_open, dtype=torch.float32),
-        torch.from_numpy(nearest_neighbours(p_before, p_after, k)),
-        torch.from_numpy(nearest_neighbours(p_after, p_before, k)),
+        *cross_neighbours(before, after, config.neighbours),
         torch.from_numpy(label.astype(np.float32)),
         torch.from_numpy(chosen),
         match_targets(p_before[chosen], label[chosen], query, pair.T_query_support),
