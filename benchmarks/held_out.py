@@ -37,11 +37,11 @@ from imop.policy.registration import RegistrationMatcher
 from imop.sim.robot import panda_self_filter
 from imop.training.depth_noise import DepthNoise
 from imop.training.families import HELD_OUT
-from imop.training.families.thing import TURNS, revolution
+from imop.training.families.thing import revolution
 from imop.training.pairs import StepPair
 from imop.training.scenes import Scene, demonstrate, draw_scene
 from imop.training.stage import Unreachable
-from imop.training.synthetic import Take, make_pair
+from imop.training.synthetic import Take, is_round, make_pair
 from imop.types import Action, FloatArray, Observation
 
 
@@ -139,7 +139,7 @@ def nearest_right(T: FloatArray, pair: StepPair) -> tuple[float, float]:
     """Metres and degrees to the right pose that is nearest, 2 cm being worth 10 degrees."""
     right, found = pair.T_query_support @ pair.T_world_goal, T @ pair.T_world_goal
     position = se3.translation_distance(right, found)
-    rotation = np.degrees(se3.rotation_distance(right, np.broadcast_to(found, right.shape)))
+    rotation = np.degrees(se3.rotation_distance(right, found))
     best = int(np.argmin(np.maximum(position / 0.02, rotation / 10)))
     return float(position[best]), float(rotation[best])
 
@@ -147,8 +147,7 @@ def nearest_right(T: FloatArray, pair: StepPair) -> tuple[float, float]:
 def with_every_turn(scene: Scene, shown: Take, k: int, pair: StepPair) -> StepPair:
     """The pair with turns of 2 degrees where a surface of revolution has, for training, turns of 30."""
     action = scene.recipe.steps[k]
-    turns = scene.stage.things[action.thing].symmetry
-    if action.link != "body" or len(turns) != TURNS or not np.allclose(turns, revolution()):
+    if action.link != "body" or not is_round(scene.stage.things[action.thing]):
         return pair
     axis = shown.poses[k][action.thing, "body"]
     spun = axis @ revolution(180) @ se3.invert(axis)

@@ -58,3 +58,12 @@ def test_batches(rng):
 def test_bad_poses_are_named(pose):
     with pytest.raises(InvalidInput, match="pose"):
         se3.from_pose7(pose)
+
+
+def test_near_asks_for_both_the_place_and_the_turn():
+    here = se3.make(p=(0.1, 0.2, 0.3))
+    others = np.stack(
+        [here @ se3.make(se3.euler(z=turn), (x, 0, 0)) for x, turn in ((0, 0), (0.02, 0), (0, 0.2))]
+    )
+    assert se3.near(others, here, 0.01, 0.1).tolist() == [True, False, False]
+    assert se3.near(others, here, 0.03, 0.3).all()

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from imop.errors import InvalidInput
-from imop.types import FloatArray
+from imop.types import BoolArray, FloatArray
 
 
 def make(R: FloatArray | None = None, p: FloatArray | tuple[float, ...] | None = None) -> FloatArray:
@@ -69,6 +69,11 @@ def rotation_distance(T_a: FloatArray, T_b: FloatArray) -> FloatArray:
 def translation_distance(T_a: FloatArray, T_b: FloatArray) -> FloatArray:
     """Distance between the origins, (...,) metres."""
     return np.asarray(np.linalg.norm(T_a[..., :3, 3] - T_b[..., :3, 3], axis=-1))
+
+
+def near(T_a: FloatArray, T_b: FloatArray, distance: float, angle: float) -> BoolArray:
+    """(...,) whether poses are less than `distance` metres and `angle` radians apart."""
+    return (translation_distance(T_a, T_b) < distance) & (rotation_distance(T_a, T_b) < angle)
 
 
 def euler(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> FloatArray:

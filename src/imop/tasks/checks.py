@@ -41,9 +41,7 @@ def at_rest(world: World, before: Mapping[str, FloatArray]) -> bool:
     if np.abs(world.data.qvel).max() > _SPEED:
         return False
     moved = [(T, world.pose(body)) for body, T in before.items()]
-    return all(
-        se3.translation_distance(a, b) < _DRIFT and se3.rotation_distance(a, b) < _TILT for a, b in moved
-    )
+    return all(se3.near(a, b, _DRIFT, _TILT) for a, b in moved)
 
 
 def reachable(world: World, T_world_gripper: FloatArray, allow_collisions: bool) -> bool:

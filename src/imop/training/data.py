@@ -41,15 +41,14 @@ class PairDataset(Dataset[Sample]):
         augmented: bool = True,
         shares: Sequence[float] = (),
     ):
-        self._config, self._seed, self._augmented = config, seed, augmented
-        self._source = _Source(folders, Shard, shares)
+        self._config, self._augmented = config, augmented
+        self._source = _Source(folders, Shard, seed, augmented, shares)
 
     def __len__(self) -> int:
         return len(self._source)
 
     def __getitem__(self, index: int) -> Sample:
-        rng = np.random.default_rng((self._seed, index))
-        pair = self._source.pick(rng, None if self._augmented else index)
+        pair, rng = self._source.pick(index)
         if self._augmented:
             pair = augment(pair, rng)
         matching = self._config.matching
@@ -78,15 +77,14 @@ class RouteDataset(Dataset[RouteSample]):
         augmented: bool = True,
         blind: bool = False,
     ):
-        self._config, self._seed, self._augmented, self._blind = config, seed, augmented, blind
-        self._source = _Source(folders, RouteShard)
+        self._config, self._augmented, self._blind = config, augmented, blind
+        self._source = _Source(folders, RouteShard, seed, augmented)
 
     def __len__(self) -> int:
         return len(self._source)
 
     def __getitem__(self, index: int) -> RouteSample:
-        rng = np.random.default_rng((self._seed, index))
-        route = self._source.pick(rng, None if self._augmented else index)
+        route, rng = self._source.pick(index)
         drawn = rng if self._augmented else None
         return make_route_sample(route, self._config.route_graph, drawn, self._blind)
 
@@ -121,11 +119,17 @@ class _Items(Protocol[Item]):
 
 
 class _Source(Generic[Item]):
-    """Everything in the shards of some folders."""
+    """Everything in the shards of some folders, drawn at random or, if not `drawn`, counted through."""
 
     def __init__(
-        self, folders: Sequence[Path], read: Callable[[Path], _Items[Item]], shares: Sequence[float] = ()
+        self,
+        folders: Sequence[Path],
+        read: Callable[[Path], _Items[Item]],
+        seed: int,
+        drawn: bool,
+        shares: Sequence[float] = (),
     ):
+        self._seed, self._drawn = seed, drawn
         shares = shares or [1.0] * len(folders)
         if len(shares) != len(folders) or min(shares) <= 0:
             raise InvalidInput("shares", f"{tuple(shares)}", f"{len(folders)} positive numbers")
@@ -136,13 +140,14 @@ class _Source(Generic[Item]):
     def __len__(self) -> int:
         return int(sum(ends[-1] for ends in self._ends))
 
-    def pick(self, rng: np.random.Generator, index: int | None) -> Item:
-        """Anything from any folder; with an `index` that one of the folder."""
+    def pick(self, index: int) -> tuple[Item, np.random.Generator]:
+        """What belongs to a sample's number, and the generator for what else is random about the sample."""
+        rng = np.random.default_rng((self._seed, index))
         source = int(rng.choice(len(self._shards), p=self._shares))
         ends = self._ends[source]
-        number = int(rng.integers(ends[-1])) if index is None else index % int(ends[-1])
+        number = int(rng.integers(ends[-1])) if self._drawn else index % int(ends[-1])
         shard = int(np.searchsorted(ends, number, side="right"))
-        return self._shards[source][shard][number - (int(ends[shard - 1]) if shard else 0)]
+        return self._shards[source][shard][number - (int(ends[shard - 1]) if shard else 0)], rng
 
 
 def _paths(folder: Path) -> list[Path]:

@@ -12,7 +12,6 @@ from imop.training.data import PairDataset, RouteDataset, loader
 from imop.training.objective import predicted_poses, right_poses
 from imop.training.pairs import PairBatch
 from imop.training.route_batch import RouteBatch
-from imop.types import FloatArray
 
 _BATCH = 8
 
@@ -92,11 +91,6 @@ def _measure(model: Model, batch: PairBatch) -> dict[str, list[float]]:
             measured["match"].append(max(float(hit.float().mean()) for hit in near))
     right = [goals.numpy() for goals in right_poses(batch)]
     for name, distance, angle in (("within_1cm_5deg", 0.01, 5.0), ("within_2cm_10deg", 0.02, 10.0)):
-        measured[name] = [float(_near(T[b], right[b], distance, np.radians(angle))) for b in range(len(T))]
+        limits = distance, np.radians(angle)
+        measured[name] = [float(se3.near(right[b], T[b], *limits).any()) for b in range(len(T))]
     return measured
-
-
-def _near(T: FloatArray, right: FloatArray, distance: float, angle: float) -> bool:
-    """Whether `T` is near one of the poses `right` (S, 4, 4)."""
-    near = se3.translation_distance(right, T) < distance
-    return bool(np.any(near & (se3.rotation_distance(right, np.broadcast_to(T, right.shape)) < angle)))

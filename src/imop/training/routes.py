@@ -143,4 +143,4 @@ def indistinguishable(states: list[State], poses: list[Poses]) -> BoolArray:
 
 
 def _near(A: FloatArray, B: FloatArray) -> bool:
-    return bool(se3.translation_distance(A, B) < _SAME_PLACE and se3.rotation_distance(A, B) < _SAME_TURN)
+    return bool(se3.near(A, B, _SAME_PLACE, _SAME_TURN))

@@ -153,7 +153,7 @@ def equal_motions(
     # Compact things overlap with themselves however they are turned, so most places are out at once.
     places = [T for T in others if query.judge(few, T)[1] > _OVERLAP * visible]
     for T in (goal @ turn for goal in (T_query_goal, *places) for turn in turns):
-        if any(_same(T, known) for known in found):
+        if se3.near(np.stack(found), T, _SAME_PLACE, _SAME_TURN).any():
             continue
         refuted, observed = query.judge(few, T)
         if refuted > usual + _REFUTED or observed < _OBSERVED * visible:
@@ -194,8 +194,3 @@ def _alike(a: FloatArray, b: FloatArray) -> BoolArray:
     bright_a, bright_b = (c.mean(axis=-1, keepdims=True) + 0.05 for c in (a, b))
     hue = np.abs(a / bright_a - b / bright_b).max(axis=-1)
     return np.asarray((hue < _HUE) & (np.abs(np.log(bright_a / bright_b))[..., 0] < np.log(_SHADE)))
-
-
-def _same(A: FloatArray, B: FloatArray) -> bool:
-    near = se3.translation_distance(A, B) < _SAME_PLACE
-    return bool(near and se3.rotation_distance(A, B) < _SAME_TURN)

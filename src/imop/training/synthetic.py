@@ -132,7 +132,7 @@ def right_motions(
 def _covered(scene: Scene, member: tuple[int, str], T: FloatArray, now: Poses) -> bool:
     """Whether a link or one like it looks as if it stood at `T`."""
     thing, link = member
-    rounded = link == "body" and _is_round(scene.stage.things[thing])
+    rounded = link == "body" and is_round(scene.stage.things[thing])
     return any(
         _same(now[twin, link] @ turn, T, rounded)
         for twin in _twins(scene, thing)
@@ -150,7 +150,8 @@ def _turns(scene: Scene, thing: int, link: str) -> FloatArray:
     return scene.stage.things[thing].symmetry if link == "body" else np.eye(4)[None]
 
 
-def _is_round(thing: Thing) -> bool:
+def is_round(thing: Thing) -> bool:
+    """Whether it is a surface of revolution."""
     return thing.symmetry.shape == revolution().shape and bool(np.allclose(thing.symmetry, revolution()))
 
 
