@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import mujoco
 import numpy as np
 
 from imop.errors import ImopError
@@ -74,6 +75,8 @@ class Stage:
     def __init__(self, things: Sequence[Thing], cameras: Mapping[str, Camera] = CAMERAS):
         self.things, self._cameras = tuple(things), cameras
         spec = scene_spec()
+        # Nothing is simulated, and things that stand in each other make thousands of contacts.
+        spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
         for i, thing in enumerate(things):
             add_to(spec, f"thing{i}", thing.part)
         self._world = World(spec)
