@@ -78,10 +78,9 @@ def sample_motions(
         return none
     fit = weighted_procrustes(torch.from_numpy(x[triples]), torch.from_numpy(y[triples]))
     T = fit.T_y_x[fit.rank >= 2].numpy()
-    T = T[np.argsort(-_agreement(T, x, y, weight, tolerance), kind="stable")[: 10 * keep]]
+    T = T[np.argsort(-agreement(T, x, y, weight, tolerance), kind="stable")[: 10 * keep]]
     T = refit(T, x, y, weight, tolerance)
-    agreement = _agreement(T, x, y, weight, tolerance)
-    order = np.argsort(-agreement, kind="stable")
+    order = np.argsort(-agreement(T, x, y, weight, tolerance), kind="stable")
     chosen = distinct(T[order], center=x.mean(axis=0), keep=keep)
     return np.asarray(T[order][chosen])
 
@@ -110,13 +109,13 @@ def _consistent(
     return good
 
 
-def _agreement(
-    T: FloatArray, x: FloatArray, y: FloatArray, weight: FloatArray, tolerance: float
+def agreement(
+    T: FloatArray, x: FloatArray, y: FloatArray, weight: FloatArray, tolerance: float = 0.015
 ) -> FloatArray:
-    """(H,) weight of the pairs that each motion carries onto each other."""
+    """(H,) share, by weight, of the pairs x -> y (K, 3) that each motion carries nearer than `tolerance`."""
     distance = np.linalg.norm(se3.apply(T, x) - y, axis=-1)
-    agreement: FloatArray = (weight * (distance < tolerance)).sum(axis=-1)
-    return agreement
+    share: FloatArray = (weight * (distance < tolerance)).sum(axis=-1) / max(weight.sum(), 1e-12)
+    return share
 
 
 def refit(T: FloatArray, x: FloatArray, y: FloatArray, weight: FloatArray, tolerance: float) -> FloatArray:
@@ -138,13 +137,14 @@ def distinct(
     by less than `angle` radians against each other.
     """
     moved = se3.apply(T, center[None])[:, 0]
+    columns = T[:, :3, :3].reshape(-1, 9)
+    # Of a relative rotation by an angle, the trace is 1 + 2 cos(angle).
+    turned = columns @ columns.T > 1 + 2 * np.cos(angle)
     chosen: list[int] = []
     for i in range(len(T)):
         if len(chosen) == keep:
             break
-        near = np.linalg.norm(moved[chosen] - moved[i], axis=1) < distance
-        turned = se3.rotation_distance(T[chosen], T[i]) < angle if chosen else np.zeros(0, dtype=bool)
-        if not np.any(near & turned):
+        if not np.any(turned[i, chosen] & (np.linalg.norm(moved[chosen] - moved[i], axis=1) < distance)):
             chosen.append(i)
     return chosen
 

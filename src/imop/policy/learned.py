@@ -21,11 +21,11 @@ from imop.networks.matching import Correspondence, reposition
 from imop.networks.model import Model
 from imop.networks.region import StepBatch, one_step
 from imop.policy.contacts import SAME, find_contacts, is_open
-from imop.policy.hypotheses import sample_motions
+from imop.policy.hypotheses import agreement, sample_motions
 from imop.policy.matcher import Hypothesis, Scene, Transition
 from imop.policy.objects import connected, find_objects
 from imop.policy.region import Region
-from imop.policy.search import Search, SearchConfig, middle, upright_motions
+from imop.policy.search import Inquiry, Search, SearchConfig, middle, upright_motions
 from imop.types import FloatArray
 
 # A region of fewer points cannot be matched.
@@ -42,6 +42,7 @@ class LearnedMatcher:
         model: the networks; see `networks.model.load_model`.
         threshold: least probability of a region point.
         candidates: query points per region point that may be matched.
+        trusted: share of the matches from which the motion that most agree on is looked at before all others.
         samples: triples drawn from the matches.
         places: things of the query on which the region is set upright, too.
         turns: how often, over a full turn.
@@ -52,6 +53,7 @@ class LearnedMatcher:
     model: Model
     threshold: float = 0.5
     candidates: int = 2
+    trusted: float = 0.5
     samples: int = 4000
     places: int = 2
     turns: int = 24
@@ -113,8 +115,13 @@ class LearnedStep:
             return ()
         matches = self._matches(found, seen)
         fit = reposition(found.last, found.p_region, found.p_query).double().numpy()
+        inquiry = Inquiry(self._search, query, things, hints)
+        if agreement(fit, matches.x, matches.y, matches.weight)[0] > self._matcher.trusted:
+            confirmed = inquiry.confirm(fit[0])
+            if confirmed:
+                return confirmed
         seeds = np.concatenate([fit, self._sampled(matches), self._upright(matches, things)])
-        return self._search(query, things, seeds, hints)
+        return inquiry.search(seeds)
 
     def _matches(self, found: Correspondence, seen: Graph) -> "_Matches":
         """The likeliest query points of every region point."""

@@ -11,7 +11,7 @@ from imop.policy.hypotheses import mutual_matches, sample_motions
 from imop.policy.matcher import Hypothesis, Scene, Transition
 from imop.policy.objects import connected, find_objects
 from imop.policy.region import Region, find_regions
-from imop.policy.search import Search, SearchConfig, middle, upright_motions
+from imop.policy.search import Inquiry, Search, SearchConfig, middle, upright_motions
 from imop.types import FloatArray
 
 
@@ -70,7 +70,7 @@ class RegisteredStep:
         if len(things) < 5:
             return ()
         seeds = np.concatenate([self._sampled(things), self._upright(things)])
-        return self._search(query, things, seeds, hints)
+        return Inquiry(self._search, query, things, hints).search(seeds)
 
     def _sampled(self, things: PointCloud) -> FloatArray:
         """(H, 4, 4) motions from matched descriptors."""

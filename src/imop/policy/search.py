@@ -14,7 +14,7 @@ from imop.policy.hypotheses import distinct
 from imop.policy.matcher import Hypothesis, Scene
 from imop.policy.refine import FINEST, Refiner, upright
 from imop.policy.region import Region
-from imop.types import FloatArray
+from imop.types import BoolArray, FloatArray
 
 # Things do not lean: a motion that tilts by this angle (radians) or more is as unlikely as any other tilt.
 TILTED = 0.17
@@ -22,6 +22,8 @@ TILTED = 0.17
 SAME_MOTION = (0.001, 0.01)
 # Farther off (metres) than this is another place.
 ELSEWHERE = 0.03
+# A likely motion that explains this share of what a trusted one does has to be compared with it.
+RIVAL = 0.85
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,7 @@ class SearchConfig:
         turn: share of its score that a hypothesis loses for half a turn off the demonstrated motion.
         tilt: share that it loses for tilting things by `TILTED` or more.
         change: share that it loses for another place than the demonstrated motion leads to.
+        sure: score from which a trusted motion needs no search.
     """
 
     refined: int = 12
@@ -45,6 +48,7 @@ class SearchConfig:
     turn: float = 0.03
     tilt: float = 0.35
     change: float = 0.12
+    sure: float = 0.7
 
 
 class Search:
@@ -57,85 +61,133 @@ class Search:
     """
 
     def __init__(self, config: SearchConfig, before: Scene, region: Region) -> None:
-        self._config, self._region = config, region
-        self._template = Template(region, before.observation.views)
-        self._center = region.cloud.points.mean(axis=0)
-        self._T_world_gripper = before.observation.T_world_gripper
-        self._coarse = [region.cloud.points[farthest_points(region.cloud.points, 400)]]
+        self.config, self.region = config, region
+        self.template = Template(region, before.observation.views)
+        self.center = region.cloud.points.mean(axis=0)
+        self.T_world_gripper = before.observation.T_world_gripper
+        self.coarse = [region.cloud.points[farthest_points(region.cloud.points, 400)]]
         if region.context is not None:
             # A thin part slides along itself; what it is fixed to holds it.
-            self._coarse.append(region.whole.points[farthest_points(region.whole.points, 600)])
-        self._fine = region.cloud.points[farthest_points(region.cloud.points, 1500)]
+            self.coarse.append(region.whole.points[farthest_points(region.whole.points, 600)])
+        self.fine = region.cloud.points[farthest_points(region.cloud.points, 1500)]
 
     def without_held(self, query: Scene, cloud: PointCloud) -> PointCloud:
         """The part of a query's cloud that is not in the hand, if the region is not what is held."""
-        if not len(self._region.p_gripper_held):
+        if not len(self.region.p_gripper_held):
             return cloud
-        p_held = se3.apply(query.observation.T_world_gripper, self._region.p_gripper_held)
+        p_held = se3.apply(query.observation.T_world_gripper, self.region.p_gripper_held)
         return cloud.select(~within(cloud.points, p_held, SAME))
 
-    def __call__(
-        self, query: Scene, things: PointCloud, seeds: FloatArray, hints: Sequence[FloatArray]
-    ) -> tuple[Hypothesis, ...]:
+
+class Inquiry:
+    """One search in one observed scene.
+
+    Args:
+        search: what is searched, and how.
+        query: the observed scene.
+        things: at least 5 points of it, all that the region may be.
+        hints: motions (4, 4) that are tried in any case.
+    """
+
+    def __init__(
+        self, search: Search, query: Scene, things: PointCloud, hints: Sequence[FloatArray] = ()
+    ) -> None:
+        self._search, self._config, self._center = search, search.config, search.center
+        self._judge = Judge(search.template, Surface(things, query.observation.views))
+        self._refine = Refiner(things.points)
+        self._T_repeated = query.observation.T_world_gripper @ se3.invert(search.T_world_gripper)
+        self._likely = np.stack([*hints, np.eye(4), self._T_repeated])
+        self._begun = bool(hints)
+
+    def confirm(self, T: FloatArray) -> tuple[Hypothesis, ...]:
+        """The motions next to a trusted one (4, 4), best first; none if it does not explain the scene.
+
+        Nor if another likely motion explains it about as well, for then all of them have to be compared.
+        """
+        glances = self._judge.glance(np.stack([T, *self._likely]))
+        rivals = ~self._near(self._likely, T) & (glances[1:] > RIVAL * glances[0])
+        if np.any(rivals):
+            return ()
+        found = [self._refined(T), self._refined(self._as_repeated(T))]
+        if self._config.turned:
+            found.append(self._refined(self._half_turn(T)))
+        preferred = self._ordered(found)[0]
+        found += [self._finished(preferred), self._upright(preferred)]
+        ordered = self._ordered(found)
+        return ordered if ordered[0].score >= self._config.sure else ()
+
+    def search(self, seeds: FloatArray) -> tuple[Hypothesis, ...]:
         """Where the region is in the query, best first.
 
         Args:
-            query: the observed scene.
-            things: at least 5 points of it, all that the region may be.
             seeds: (H, 4, 4) motions to begin with.
-            hints: motions (4, 4) that are tried in any case.
         """
-        judge = Judge(self._template, Surface(things, query.observation.views))
-        T_repeated = query.observation.T_world_gripper @ se3.invert(self._T_world_gripper)
-        likely = np.stack([*hints, np.eye(4), T_repeated])
-        order = np.argsort(-judge.glance(seeds), kind="stable")
-        chosen = distinct(seeds[order], self._center, keep=self._config.refined)
-        motions = self._refined(things, judge, likely, seeds[order[chosen]])
-        preference = [self._preference(hypothesis, T_repeated, bool(hints)) for hypothesis in motions]
-        best_first = [motions[i] for i in np.argsort(-np.asarray(preference), kind="stable")]
-        different = distinct(np.stack([h.T_query_support for h in best_first]), self._center, len(best_first))
-        return tuple(best_first[i] for i in different)
-
-    def _refined(
-        self, things: PointCloud, judge: Judge, likely: FloatArray, seeds: FloatArray
-    ) -> list[Hypothesis]:
-        """The likely motions as they are, all motions refined, and all of these set upright."""
-        refine = Refiner(things.points)
-        found = [judge.judge(T) for T in likely]
-        found += [judge.judge(refine(part, T)) for part in self._coarse for T in [*likely, *seeds]]
-        found.sort(key=lambda hypothesis: -hypothesis.score)
-        ends = [self._half_turn(h.T_query_support) for h in found[: self._config.turned]]
-        found += [judge.judge(refine(part, T)) for part in self._coarse for T in ends]
-        found.sort(key=lambda hypothesis: -hypothesis.score)
+        seeds = seeds[np.argsort(-self._judge.glance(seeds), kind="stable")]
+        seeds = seeds[distinct(seeds, self._center, keep=self._config.refined)]
+        starts, parts = [*self._likely, *seeds], range(len(self._search.coarse))
+        found = [self._judge.judge(T) for T in self._likely]
+        found += [self._refined(T, part) for part in parts for T in starts]
+        ends = [self._half_turn(h.T_query_support) for h in _best(found, self._config.turned)]
+        found = _best(found + [self._refined(T, part) for part in parts for T in ends])
         # Many seeds end in the same place.
         motions = np.stack([hypothesis.T_query_support for hypothesis in found])
         found = [found[i] for i in distinct(motions, self._center, len(found), *SAME_MOTION)]
         # The last half millimetre is worth looking for only where it matters.
-        finished = [refine(self._fine, h.T_query_support, FINEST) for h in found[: self._config.finished]]
-        found += [judge.judge(T) for T in finished]
-        found.sort(key=lambda hypothesis: -hypothesis.score)
-        best = found[: self._config.righted]
-        return found + [judge.judge(upright(h.T_query_support, self._center)) for h in best]
+        found = _best(found + [self._finished(h) for h in found[: self._config.finished]])
+        return self._ordered(found + [self._upright(h) for h in found[: self._config.righted]])
+
+    def _refined(self, T: FloatArray, part: int = -1) -> Hypothesis:
+        return self._judge.judge(self._refine(self._search.coarse[part], T))
+
+    def _finished(self, hypothesis: Hypothesis) -> Hypothesis:
+        return self._judge.judge(self._refine(self._search.fine, hypothesis.T_query_support, FINEST))
+
+    def _upright(self, hypothesis: Hypothesis) -> Hypothesis:
+        return self._judge.judge(upright(hypothesis.T_query_support, self._center))
 
     def _half_turn(self, T: FloatArray) -> FloatArray:
         """The motion, then half a turn about the vertical through the middle of what it moved."""
-        p = se3.apply(T, middle(self._coarse[-1])[None])[0]
+        p = se3.apply(T, middle(self._search.coarse[-1])[None])[0]
         R = se3.euler(z=np.pi)
         return se3.make(R, p - R @ p) @ T
 
-    def _preference(self, hypothesis: Hypothesis, T_repeated: FloatArray, begun: bool) -> float:
+    def _as_repeated(self, T: FloatArray) -> FloatArray:
+        """The demonstrated motion, carried on to the place where `T` leads to."""
+        p = middle(self._search.coarse[-1])[None]
+        T_repeated = self._T_repeated.copy()
+        T_repeated[:3, 3] += (se3.apply(T, p) - se3.apply(T_repeated, p))[0]
+        return T_repeated
+
+    def _near(self, T_likely: FloatArray, T: FloatArray) -> BoolArray:
+        """(H,) which motions carry the region about where `T` does."""
+        p_likely, p = se3.apply(T_likely, self._center[None])[:, 0], se3.apply(T, self._center[None])[0]
+        near: BoolArray = np.linalg.norm(p_likely - p, axis=1) < ELSEWHERE
+        return near
+
+    def _ordered(self, found: list[Hypothesis]) -> tuple[Hypothesis, ...]:
+        """The different ones among hypotheses, preferred first."""
+        preference = np.array([self._preference(hypothesis) for hypothesis in found])
+        ordered = [found[i] for i in np.argsort(-preference, kind="stable")]
+        motions = np.stack([hypothesis.T_query_support for hypothesis in ordered])
+        return tuple(ordered[i] for i in distinct(motions, self._center, len(ordered)))
+
+    def _preference(self, hypothesis: Hypothesis) -> float:
         """The score, less for moving otherwise than demonstrated and for tilting what stands on a table.
 
         Symmetric things have many equal explanations; the one that repeats the demonstrated motion of the
         gripper from where it is now (`T_repeated`) is the easiest to reach and does not twist what is held.
-        Among equal things, the one that was approached (if the episode has `begun`) stays the aim.
+        Among equal things, the one that was approached (if the episode has begun) stays the aim.
         """
         T, cost = hypothesis.T_query_support, self._config
-        turn = float(se3.rotation_distance(T, T_repeated)) / np.pi
+        turn = float(se3.rotation_distance(T, self._T_repeated)) / np.pi
         tilt = min(float(np.arccos(np.clip(T[2, 2], -1.0, 1.0))) / TILTED, 1.0)
-        p_moved, p_repeated = se3.apply(np.stack([T, T_repeated]), self._center[None])[:, 0]
-        away = min(float(np.linalg.norm(p_moved - p_repeated)) / ELSEWHERE, 1.0) if begun else 0.0
+        p_moved, p_repeated = se3.apply(np.stack([T, self._T_repeated]), self._center[None])[:, 0]
+        away = min(float(np.linalg.norm(p_moved - p_repeated)) / ELSEWHERE, 1.0) if self._begun else 0.0
         return hypothesis.score * (1 - cost.turn * turn - cost.tilt * tilt - cost.change * away)
+
+
+def _best(found: list[Hypothesis], count: int | None = None) -> list[Hypothesis]:
+    return sorted(found, key=lambda hypothesis: -hypothesis.score)[:count]
 
 
 def upright_motions(center: FloatArray, places: FloatArray, turns: int) -> FloatArray:
