@@ -43,11 +43,19 @@ def test_a_flat_table_stays_flat_and_principal_point_is_below_the_camera():
 
 def test_unproject_inverts_projection(rng):
     view = replace(flat_view(), depth=rng.uniform(0.5, 1.0, (32, 32)))
-    p_camera = se3.apply(se3.invert(DOWN), clouds.unproject(view).reshape(-1, 3))
-    pixels = p_camera @ view.intrinsics.T
+    pixels, depth, inside = clouds.project(view, clouds.unproject(view).reshape(-1, 3))
     v, u = np.mgrid[:32, :32]
-    np.testing.assert_allclose(pixels[:, 0] / pixels[:, 2], u.ravel(), atol=1e-6)
-    np.testing.assert_allclose(pixels[:, 1] / pixels[:, 2], v.ravel(), atol=1e-6)
+    assert inside.all()
+    np.testing.assert_array_equal(pixels, np.stack([u.ravel(), v.ravel()], axis=1))
+    np.testing.assert_allclose(depth, view.depth.ravel(), atol=1e-6)
+
+
+def test_points_behind_the_camera_or_beside_its_image_are_not_in_it():
+    view = flat_view()
+    beside = clouds.unproject(view)[16, 16] + np.array([1.0, 0.0, 0.0])
+    behind = view.T_world_camera[:3, 3] - 0.1 * view.T_world_camera[:3, 2]
+    pixels, _, inside = clouds.project(view, np.stack([beside, behind]))
+    assert not inside.any() and not pixels.any()
 
 
 @pytest.mark.parametrize("missing", [0.0, np.nan, np.inf, -1.0])

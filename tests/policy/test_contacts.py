@@ -15,7 +15,7 @@ HIGH = above(0.3, -0.1, TABLE + 0.3)
 
 def contacts_of(scenes, actions):
     steps = transitions(scenes, actions)
-    return find_contacts(steps, [find_objects(step.before.cloud) for step in steps])
+    return find_contacts(steps, [find_objects(step.before.cloud, step.before.ground.plane) for step in steps])
 
 
 def test_grasp_carry_release():

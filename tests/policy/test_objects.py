@@ -3,13 +3,18 @@
 import numpy as np
 
 from imop.geometry.cloud import concatenate
+from imop.geometry.perception import supporting_plane
 from imop.policy.objects import connected, find_objects
 from tests.policy.scenes import RED, TABLE, at, box, table
 
 
+def objects_of(cloud):
+    return find_objects(cloud, supporting_plane(cloud))
+
+
 def test_every_box_is_one_object_and_the_table_none():
     boxes = [box((0.04, 0.04, 0.04), RED, at(x, 0.1)) for x in (0.0, 0.1, 0.2)]
-    found = find_objects(concatenate([table(), *boxes]))
+    found = objects_of(concatenate([table(), *boxes]))
     assert len(np.unique(found.labels)) == 3
     assert found.height.min() > 0.005
     np.testing.assert_allclose(found.height, found.cloud.points[:, 2] - TABLE, atol=1e-6)
@@ -19,19 +24,19 @@ def test_every_box_is_one_object_and_the_table_none():
 
 def test_boxes_that_touch_are_one_object():
     boxes = [box((0.04, 0.04, 0.04), RED, at(x, 0.1)) for x in (0.0, 0.05)]
-    assert len(np.unique(find_objects(concatenate([table(), *boxes])).labels)) == 1
+    assert len(np.unique(objects_of(concatenate([table(), *boxes])).labels)) == 1
 
 
 def test_specks_are_dropped():
     thing = box((0.04, 0.04, 0.04), RED, at(0.0, 0.1))
     speck = thing.select(np.arange(3))
     speck = type(speck)(speck.points + np.array([0.3, 0, 0.2]), speck.colors, speck.camera, speck.normals)
-    found = find_objects(concatenate([table(), thing, speck]))
+    found = objects_of(concatenate([table(), thing, speck]))
     assert found.cloud.points[:, 0].max() < 0.1
 
 
 def test_bare_table_is_the_only_object():
-    found = find_objects(table())
+    found = objects_of(table())
     assert len(found) == len(table()) and set(found.labels) == {0}
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import fpsample
 import numpy as np
 import small_gicp
+import torch
 from numpy.typing import NDArray
 
 from imop.errors import InvalidInput
@@ -55,6 +56,26 @@ def unproject(view: CameraView) -> FloatArray:
     depth = np.where(view.measured, view.depth, 0.0).astype(np.float64)
     rays = np.stack([u, v, np.ones_like(u)], axis=-1) @ np.linalg.inv(view.intrinsics).T
     return se3.apply(view.T_world_camera, (rays * depth[..., None]).reshape(-1, 3)).reshape(height, width, 3)
+
+
+def project(view: CameraView, p_world: FloatArray) -> tuple[NDArray[np.int64], FloatArray, BoolArray]:
+    """Where a view would show points.
+
+    Args:
+        view: the camera.
+        p_world: (N, 3) points, metres.
+
+    Returns:
+        (N, 2) nearest pixel, column and row, 0 where there is none; (N,) metres along the optical axis; (N,)
+        whether the point lies before the camera and in its image.
+    """
+    p_camera = se3.apply(se3.invert(view.T_world_camera), p_world)
+    z = p_camera[:, 2]
+    before = z > 1e-3
+    uv = (p_camera @ view.intrinsics.T)[:, :2] / np.where(before, z, 1.0)[:, None]
+    pixel = np.where(before[:, None], np.round(uv), -1).astype(np.int64)
+    inside = np.all((pixel >= 0) & (pixel < view.depth.shape[::-1]), axis=1)
+    return np.where(inside[:, None], pixel, 0), z, inside
 
 
 def flying_pixels(view: CameraView, gap: float = FLYING_PIXEL_GAP) -> BoolArray:
@@ -196,7 +217,9 @@ def estimate_normals(cloud: PointCloud, viewpoints: FloatArray, neighbours: int 
     normals = to_camera.copy()
     if len(cloud) >= 5:
         target = small_gicp.PointCloud(cloud.points)
-        small_gicp.estimate_normals(target, num_neighbors=min(neighbours, len(cloud)), num_threads=1)
+        small_gicp.estimate_normals(
+            target, num_neighbors=min(neighbours, len(cloud)), num_threads=torch.get_num_threads()
+        )
         found = np.asarray(target.normals())[:, :3]
         defined = np.linalg.norm(found, axis=1) > 0.5
         normals[defined] = found[defined]

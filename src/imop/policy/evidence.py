@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud, concatenate, farthest_points
+from imop.geometry.cloud import PointCloud, concatenate, farthest_points, project
 from imop.policy.matcher import Hypothesis
 from imop.policy.region import Region
 from imop.types import BoolArray, CameraView, Float32Array, FloatArray
@@ -57,7 +57,7 @@ class Surface:
     ) -> None:
         self.cloud = cloud
         self.tolerances = tolerances or Tolerances()
-        self._views = [(se3.invert(view.T_world_camera), view) for view in views.values()]
+        self._views = list(views.values())
         self._tree = cKDTree(cloud.points) if len(cloud) else None
         self._shades = shades(cloud.colors)
 
@@ -97,19 +97,14 @@ class Surface:
         A view can if the face lies in its image and turns to it, and nothing nearer stands before it.
         """
         hidden = np.ones(len(points), dtype=bool)
-        for T_camera_world, view in self._views:
-            p_camera, n_camera = se3.apply(T_camera_world, points), se3.rotate(T_camera_world, normals)
-            z = p_camera[:, 2]
-            distance = np.maximum(np.linalg.norm(p_camera, axis=1), 1e-9)
-            slant = -np.einsum("mk,mk->m", p_camera, n_camera) / distance
-            in_front = (z > 1e-3) & (slant > self.tolerances.grazing)
-            uvw = p_camera @ view.intrinsics.T
-            uv = np.round(uvw[:, :2] / np.where(in_front, z, 1.0)[:, None]).astype(np.int64)
-            height, width = view.depth.shape
-            inside = in_front & np.all((uv >= 0) & (uv < (width, height)), axis=1)
-            u, v = np.where(inside[:, None], uv, 0).T
-            depth = view.depth[v, u]
-            hidden &= ~(inside & np.isfinite(depth) & (depth > z - self.tolerances.depth))
+        for view in self._views:
+            to_camera = view.T_world_camera[:3, 3] - points
+            distance = np.maximum(np.linalg.norm(to_camera, axis=1), 1e-9)
+            slant = np.einsum("mk,mk->m", to_camera, normals) / distance
+            (column, row), z, inside = (part.T for part in project(view, points))
+            depth = view.depth[row, column]
+            clear = np.isfinite(depth) & (depth > z - self.tolerances.depth)
+            hidden &= ~(inside & clear & (slant > self.tolerances.grazing))
         return hidden
 
     def possible(self, cloud: PointCloud, weight: FloatArray, explained: FloatArray) -> FloatArray:

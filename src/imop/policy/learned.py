@@ -64,7 +64,8 @@ class LearnedMatcher:
 
     def prepare(self, steps: Sequence[Transition]) -> list["LearnedStep"]:
         """Find the regions of a demonstration's steps and describe them."""
-        held = find_contacts(steps, [find_objects(step.before.cloud) for step in steps]).p_gripper_held
+        objects = [find_objects(step.before.cloud, step.before.ground.plane) for step in steps]
+        held = find_contacts(steps, objects).p_gripper_held
         return [LearnedStep(self, step, p_held) for step, p_held in zip(steps, held, strict=True)]
 
 

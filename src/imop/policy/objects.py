@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from imop.geometry.cloud import PointCloud
-from imop.geometry.perception import PLANE_THICKNESS, supporting_plane
+from imop.geometry.perception import PLANE_THICKNESS, Plane
 from imop.types import FloatArray
 
 # The images resolve 8 mm at arm's length and less on slanted faces; wider gaps part things, metres.
@@ -43,12 +43,11 @@ def connected(points: FloatArray, gap: float = GAP) -> NDArray[np.int64]:
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
-def find_objects(cloud: PointCloud, gap: float = GAP, smallest: int = 8) -> Objects:
+def find_objects(cloud: PointCloud, plane: Plane | None, gap: float = GAP, smallest: int = 8) -> Objects:
     """The clusters that remain without the supporting plane; fewer than `smallest` points are specks.
 
     If nothing remains, the whole cloud is one object: then the plane itself is all there is to go by.
     """
-    plane = supporting_plane(cloud)
     height = np.zeros(len(cloud)) if plane is None else plane.height(cloud.points)
     standing = height > (-np.inf if plane is None else PLANE_THICKNESS)
     above = cloud.select(standing)

@@ -57,7 +57,7 @@ class Region:
 
 def find_regions(steps: Sequence[Transition]) -> list[Region]:
     """The region of every step of one demonstration."""
-    objects = [find_objects(step.before.cloud) for step in steps]
+    objects = [find_objects(step.before.cloud, step.before.ground.plane) for step in steps]
     contacts = find_contacts(steps, objects)
     return [_region(steps, k, objects[k], contacts) for k in range(len(steps))]
 

@@ -66,7 +66,9 @@ class RegisteredStep:
 
     def match(self, query: Scene, hints: Sequence[FloatArray] = ()) -> tuple[Hypothesis, ...]:
         """Where the region is in the query, best first; see `PreparedStep.match`."""
-        things = self._search.without_held(query, find_objects(query.cloud).cloud)
+        if len(query.cloud) < 5:
+            return ()
+        things = self._search.without_held(query, find_objects(query.cloud, query.ground.plane).cloud)
         if len(things) < 5:
             return ()
         seeds = np.concatenate([self._sampled(things), self._upright(things)])

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from imop.demos.regions import BACKGROUND
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud
+from imop.geometry.cloud import PointCloud, project
 from imop.geometry.neighbours import nearest
 from imop.types import BoolArray, FloatArray, Observation
 
@@ -115,13 +115,8 @@ class Scene:
         """(N,) True where a camera measured something well behind a point."""
         through = np.zeros(len(points), dtype=bool)
         for view in self._views:
-            p = se3.apply(se3.invert(view.T_world_camera), points)
-            before = p[:, 2] > 0.01
-            uv = (p @ view.intrinsics.T)[:, :2] / np.where(before, p[:, 2], 1.0)[:, None]
-            pixel = np.where(before[:, None], np.round(uv), -1).astype(np.int64)
-            inside = np.all((pixel >= 0) & (pixel < view.depth.shape[::-1]), axis=1)
-            column, row = np.where(inside[:, None], pixel, 0).T
-            through |= inside & view.measured[row, column] & (view.depth[row, column] > p[:, 2] + _BEHIND)
+            (column, row), z, inside = (part.T for part in project(view, points))
+            through |= inside & view.measured[row, column] & (view.depth[row, column] > z + _BEHIND)
         return through
 
 
