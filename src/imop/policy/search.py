@@ -108,11 +108,12 @@ class Inquiry:
         rivals = ~self._near(self._likely, T) & (glances[1:] > RIVAL * glances[0])
         if np.any(rivals):
             return ()
-        found = [self._refined(T), self._refined(self._as_repeated(T))]
+        found = [self._refined(T)]
+        T = found[0].T_query_support
+        found += [self._refined(self._as_repeated(T)), self._upright(T)]
         if self._config.turned:
             found.append(self._refined(self._half_turn(T)))
-        preferred = self._ordered(found)[0]
-        found += [self._finished(preferred), self._upright(preferred)]
+        found.append(self._finished(self._ordered(found)[0].T_query_support))
         ordered = self._ordered(found)
         return ordered if ordered[0].score >= self._config.sure else ()
 
@@ -133,17 +134,17 @@ class Inquiry:
         motions = np.stack([hypothesis.T_query_support for hypothesis in found])
         found = [found[i] for i in distinct(motions, self._center, len(found), *SAME_MOTION)]
         # The last half millimetre is worth looking for only where it matters.
-        found = _best(found + [self._finished(h) for h in found[: self._config.finished]])
-        return self._ordered(found + [self._upright(h) for h in found[: self._config.righted]])
+        found = _best(found + [self._finished(h.T_query_support) for h in found[: self._config.finished]])
+        return self._ordered(found + [self._upright(h.T_query_support) for h in found[: self._config.righted]])
 
     def _refined(self, T: FloatArray, part: int = -1) -> Hypothesis:
         return self._judge.judge(self._refine(self._search.coarse[part], T))
 
-    def _finished(self, hypothesis: Hypothesis) -> Hypothesis:
-        return self._judge.judge(self._refine(self._search.fine, hypothesis.T_query_support, FINEST))
+    def _finished(self, T: FloatArray) -> Hypothesis:
+        return self._judge.judge(self._refine(self._search.fine, T, FINEST))
 
-    def _upright(self, hypothesis: Hypothesis) -> Hypothesis:
-        return self._judge.judge(upright(hypothesis.T_query_support, self._center))
+    def _upright(self, T: FloatArray) -> Hypothesis:
+        return self._judge.judge(upright(T, self._center))
 
     def _half_turn(self, T: FloatArray) -> FloatArray:
         """The motion, then half a turn about the vertical through the middle of what it moved."""
