@@ -1,0 +1,47 @@
+"""Confirming one motion without a search, on boxes."""
+
+import numpy as np
+
+from imop.geometry import se3
+from imop.policy.objects import find_objects
+from imop.policy.region import Region
+from imop.policy.search import Inquiry, Search, SearchConfig
+from tests.policy.scenes import RED, above, at, box, scene
+
+HOME = above(0.0, -0.3, 1.2)
+SIZE = (0.1, 0.05, 0.06)
+HERE, THERE = at(0.1, 0.1), at(0.3, -0.2, yaw=1.2)
+T = THERE @ se3.invert(HERE)
+
+
+def inquiry(poses, hints=(), T_world_gripper=HOME):
+    cloud = box(SIZE, RED, HERE)
+    region = Region(cloud, np.ones(len(cloud)), np.zeros((0, 3)))
+    search = Search(SearchConfig(turned=2), scene([cloud], HOME), region)
+    query = scene([box(SIZE, RED, pose, seed=1 + k) for k, pose in enumerate(poses)], T_world_gripper)
+    return Inquiry(search, query, find_objects(query.cloud, query.ground.plane).cloud, hints)
+
+
+def test_a_motion_that_is_nearly_right_is_confirmed_and_mended():
+    found = inquiry([THERE]).confirm(at(0.008, -0.006, 0.0) @ T)
+    error = se3.translation_distance(found[0].T_query_support @ HERE, THERE)
+    assert error < 0.003 and found[0].score > 0.9
+
+
+def test_a_motion_to_nowhere_is_not_confirmed():
+    assert inquiry([THERE]).confirm(at(0.0, 0.3, 0.0) @ T) == ()
+
+
+def test_a_motion_is_not_confirmed_if_the_aim_so_far_is_as_good():
+    other = at(0.0, 0.2)
+    hint = other @ se3.invert(HERE)
+    assert inquiry([THERE, other], [hint]).confirm(T) == ()
+    assert inquiry([THERE, other], [T]).confirm(T) != ()
+
+
+def test_of_equal_turns_the_demonstrated_one_is_preferred():
+    # A box looks the same after half a turn; the gripper has not turned since the demonstration.
+    half_turn = at(0.3, -0.2, yaw=np.pi) @ se3.invert(HERE)
+    best = inquiry([at(0.3, -0.2)]).confirm(half_turn)[0]
+    assert se3.rotation_distance(best.T_query_support, np.eye(4)) < 0.05
+    assert abs(best.T_query_support[2, 3]) < 0.003
