@@ -1,7 +1,7 @@
 """Pictures on meshes: the colour of a texture where a ray met the surface.
 
-Rays tell the geometry and the point, not the triangle. The nearest of points sown over the mesh, with a normal like
-the ray's, tells the triangle, whose corners' texture coordinates are then interpolated exactly.
+Rays tell the geometry and the point, not the triangle. The nearest of points sown over the mesh, with a normal
+like the ray's, tells the triangle, whose corners' texture coordinates are then interpolated exactly.
 """
 
 from functools import cached_property
@@ -49,7 +49,7 @@ class MeshPicture:
         many = max(1.0, wanted.sum() / _MOST)
         n = np.maximum(1, wanted / many).astype(np.int64)
         triangle = np.repeat(np.arange(len(n)), n)
-        # Points of a low-discrepancy sequence, folded into the triangle, spread evenly; the first is its middle.
+        # A low-discrepancy sequence folded into the triangle spreads evenly; its first point is the middle.
         k = np.arange(len(triangle)) - np.repeat(np.cumsum(n) - n, n)
         s, t = (1 / 3 + 0.7548776662466927 * k) % 1.0, (1 / 3 + 0.5698402909980532 * k) % 1.0
         outside = s + t > 1
@@ -59,7 +59,7 @@ class MeshPicture:
         return cKDTree(key), triangle.astype(np.int32)
 
     def colors(self, points: FloatArray, normals: FloatArray) -> FloatArray:
-        """(n, 3) red, green, blue, 0 .. 1, at `points` (n, 3) with unit normals (n, 3), in the geom's frame."""
+        """(n, 3) red, green, blue, 0 .. 1, at points (n, 3) with unit normals (n, 3) in the geom's frame."""
         tree, triangle = self._tree
         key = np.concatenate([points, _NORMAL_WEIGHT * normals], axis=1)
         hit = triangle[tree.query(key)[1]]

@@ -1,4 +1,4 @@
-"""The grammar of a body: items of a three-letter tag, a length and a payload, some payloads being sections."""
+"""The grammar of a body: items of a three-letter tag, a length and a payload, often a section itself."""
 
 from dataclasses import dataclass
 
