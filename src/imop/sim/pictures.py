@@ -1,7 +1,7 @@
 """Pictures on meshes: the colour of a texture where a ray met the surface.
 
-Rays tell the geometry and the point, not the triangle. The nearest of points sown over the mesh, with a normal
-like the ray's, tells the triangle, whose corners' texture coordinates are then interpolated exactly.
+Rays tell the geometry and the point, not the triangle. The nearest of points sown over the mesh, with a
+normal like the ray's, tells the triangle, whose corners' texture coordinates are then interpolated exactly.
 """
 
 from functools import cached_property

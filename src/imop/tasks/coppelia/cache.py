@@ -1,7 +1,7 @@
 """Models by their file's contents: what was unpacked once is kept in the user's folder for caches.
 
-Unpacking takes nine tenths of reading a large model, so the cache holds bodies as they are: plain bytes, which
-the reader trusts as little as the file itself.
+Unpacking takes nine tenths of reading a large model, so the cache holds bodies as they are: plain bytes,
+which the reader trusts as little as the file itself.
 """
 
 import hashlib

@@ -12,7 +12,7 @@ from imop.errors import ModelFormatError
 from imop.tasks.coppelia.chains import chain
 from imop.types import ByteArray, IntArray
 
-_WINDOW = 16
+_WINDOW = 12
 """Bits that one look at the table decides."""
 _LONGEST = 45
 """A code of that many bits needs Fibonacci's 47th number of bytes, more than a size can say."""
@@ -61,7 +61,9 @@ def _decode_chunk(stream: ByteArray, first: int, n: int, bit: int, code: _Code) 
     """The codes that begin in `n` bytes, from `bit` of the first; and the bit after the last."""
     wide = stream[first : first + n + 2].astype(np.int32)
     three = (wide[:-2] << 16) | (wide[1:-1] << 8) | wide[2:]
-    windows = ((three[:, None] >> (8 - np.arange(8))) & 0xFFFF).ravel().astype(np.int32)
+    windows = (
+        ((three[:, None] >> (24 - _WINDOW - np.arange(8))) & ((1 << _WINDOW) - 1)).ravel().astype(np.int32)
+    )
     node, depth = code.node[windows], code.depth[windows]
     long = np.flatnonzero(code.symbol[node] < 0)
     bits = stream[first : first + n + 2 + _LONGEST // 8]

@@ -1,7 +1,7 @@
 """Moving and colouring what a model brought, after the scene was compiled.
 
-Nested bodies are moved by rewriting where they hang (`body_pos`, `body_quat` of the model), which `World` saves
-and restores with its state; free bodies by their joint. Nothing has to be compiled again.
+Nested bodies are moved by rewriting where they hang (`body_pos`, `body_quat` of the model), which `World`
+saves and restores with its state; free bodies by their joint. Nothing has to be compiled again.
 """
 
 from collections.abc import Sequence

@@ -67,7 +67,8 @@ class Values:
 
     def any_floats(self, n: int) -> FloatArray:
         """(n,) numbers of any value."""
-        return self._take("<f8" if self.wide else "<f4", n, "numbers").astype(np.float64)
+        with np.errstate(invalid="ignore"):  # some patterns of bits are not even proper NaNs
+            return self._take("<f8" if self.wide else "<f4", n, "numbers").astype(np.float64)
 
     def floats(self, n: int) -> FloatArray:
         """(n,) finite numbers."""
@@ -91,7 +92,7 @@ class Values:
     def finite32(self) -> Float32Array:
         """All that is left as finite floats of four bytes."""
         start = self.at
-        found: Float32Array = self.rest32().astype(np.float32)
+        found: Float32Array = self.rest32()
         if not np.all(np.abs(found) <= _LARGEST):
             raise ModelFormatError(start, "not finite or huge", "numbers of ordinary size")
         return found

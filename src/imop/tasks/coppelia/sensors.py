@@ -67,7 +67,7 @@ def volume(sensor: ProximitySensor) -> Volume:
 def intersects(volume: Volume, triangles: FloatArray) -> BoolArray:
     """(t,) whether each triangle (t, 3, 3), in the volume's frame, meets it: no plane separates the two."""
     low, high = volume.corners.min(axis=0), volume.corners.max(axis=0)
-    meets = np.all((triangles.min(axis=1) <= high) & (triangles.max(axis=1) >= low), axis=1)
+    meets: BoolArray = np.all((triangles.min(axis=1) <= high) & (triangles.max(axis=1) >= low), axis=1)
     near = np.flatnonzero(meets)
     if len(near) == 0:
         return meets
