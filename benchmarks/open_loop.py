@@ -33,10 +33,10 @@ from imop.evaluation.open_loop import Case, RecordedPoses, ask
 from imop.evaluation.open_loop_rows import COARSE, Row, by_task
 from imop.evaluation.oracle import OraclePolicy
 from imop.evaluation.picture import Panel, save_picture
-from imop.evaluation.recordings import Recordings, objects_world, user_cache
+from imop.evaluation.recordings import Recordings, objects_world
 from imop.evaluation.rollout import Policy
 from imop.evaluation.trials import Trial, make_policy, suite_trials
-from imop.files import replaced
+from imop.files import replaced, user_cache
 from imop.tasks.expert import ExpertFailed
 from imop.tasks.layout import NoRoom
 from imop.types import Action

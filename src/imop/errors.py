@@ -24,6 +24,14 @@ class CorruptData(ImopError):
         super().__init__(f"{path}: {problem}; remedy: {remedy}")
 
 
+class ModelFormatError(ImopError):
+    """A CoppeliaSim model is not what the format demands; `offset` counts bytes of the (unpacked) body."""
+
+    def __init__(self, offset: int, problem: str, expected: str):
+        self.offset, self.problem, self.expected = offset, problem, expected
+        super().__init__(f"model: {problem} at byte {offset}; expected: {expected}")
+
+
 PlanFailure = Literal[
     "outside_workspace",
     "unreachable",

@@ -2,8 +2,9 @@ import pytest
 
 from imop.errors import InvalidInput
 from imop.evaluation import recordings as module
-from imop.evaluation.recordings import Recordings, objects_world, user_cache
+from imop.evaluation.recordings import Recordings, objects_world
 from imop.evaluation.trials import DEMONSTRATION_SEED, Trial
+from imop.files import user_cache
 from imop.tasks.expert import ExpertFailed
 
 POT = Trial("tabletop/lid_off_pot", seed=3, instance=1)

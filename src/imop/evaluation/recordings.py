@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import os
 from dataclasses import asdict
 from pathlib import Path
 
@@ -19,11 +18,6 @@ from imop.tasks.env import make_task
 from imop.tasks.expert import ExpertFailed, record_demonstration
 from imop.tasks.layout import NoRoom
 from imop.types import Demonstration
-
-
-def user_cache() -> Path:
-    """The user's folder for what can be made again."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "imop"
 
 
 class Recordings:

@@ -89,11 +89,12 @@ def _colours(model: Any) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class _Hits:
-    """What the rays of one image met: depth (N,) with 0 for nothing, geom (N,), normal (N, 3)."""
+    """What the rays of one image met: depth (N,) with 0 for nothing, geom (N,), point and normal (N, 3)."""
 
     rays: FloatArray
     depth: FloatArray
     geom: IntArray
+    point: FloatArray
     normal: FloatArray
 
 
@@ -111,7 +112,18 @@ def _cast(world: World, T: FloatArray, K: FloatArray, width: int, height: int, f
     )
     nothing = (geom < 0) | (depth > far)
     depth[nothing], geom[nothing] = 0.0, -1
-    return _Hits(rays, depth, geom, normal)
+    return _Hits(rays, depth, geom, T[:3, 3] + depth[:, None] * rays, normal)
+
+
+def _paint(world: World, hits: _Hits) -> FloatArray:
+    """(N, 3) colours of the surfaces, pictures included, before any light falls on them."""
+    rgb: FloatArray = _colours(world.model)[hits.geom]
+    for geom in set(np.unique(hits.geom).tolist()) & world.pictures.keys():
+        met = np.flatnonzero(hits.geom == geom)
+        R = world.data.geom_xmat[geom].reshape(3, 3)
+        points = (hits.point[met] - world.data.geom_xpos[geom]) @ R
+        rgb[met] *= world.pictures[geom].colors(points, hits.normal[met] @ R)
+    return rgb
 
 
 def _shade(world: World, hits: _Hits) -> ByteArray:
@@ -121,7 +133,7 @@ def _shade(world: World, hits: _Hits) -> ByteArray:
     normal = hits.normal * np.where(facing < 0, -1.0, 1.0)[:, None]
     lamp = np.clip(normal @ LAMP_DIRECTION, 0.0, None)
     light = AMBIENT + HEADLIGHT * np.abs(facing) + LAMP * lamp
-    rgb = _colours(world.model)[hits.geom] * light[:, None]
+    rgb = _paint(world, hits) * light[:, None]
     rgb[hits.geom < 0] = BACKGROUND
     image: ByteArray = np.round(255 * np.clip(rgb, 0.0, 1.0)).astype(np.uint8)
     return image

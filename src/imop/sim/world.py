@@ -4,6 +4,7 @@ World frame as RLBench's: z up, floor at z = 0, table top at z = 0.75, the arm's
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import mujoco
@@ -12,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from imop.errors import InvalidInput
 from imop.geometry import se3
+from imop.sim.pictures import MeshPicture, find_pictures
 from imop.sim.robot import FINGER_STROKE, PANDA_HOME_Q, T_WORLD_BASE, panda_spec
 from imop.types import FloatArray, IntArray, as_pose
 
@@ -141,6 +143,11 @@ class World:
         self.finger_ctrl = np.array([self.model.actuator(name).id for name in FINGER_JOINTS])
         self._tip = self.model.site(f"{ROBOT}tip").id
         self.set_robot(PANDA_HOME_Q, 1.0)
+
+    @cached_property
+    def pictures(self) -> dict[int, MeshPicture]:
+        """Geometry number -> the picture on it, for those that have one."""
+        return find_pictures(self.model)
 
     def set_robot(self, q: FloatArray, opening: float) -> None:
         """Put the arm at rest at `q` (7,) with the gripper at `opening` (0 closed .. 1 open)."""

@@ -6,6 +6,7 @@ python -m imop.training.loop --out runs/routing --networks routing --routes PATH
 
 import json
 import math
+import os
 import shlex
 import sys
 import time
@@ -108,7 +109,7 @@ def train(
     """
     shape = model_config or ModelConfig()
     _check(config, shape)
-    fabric = Fabric()
+    fabric = _fabric()
     fabric.launch()
     torch.manual_seed(config.seed)
     state = TrainState(Model(shape), config)
@@ -127,6 +128,13 @@ def train(
                     progress.report(_report(config, state, history[-config.every :]))
                 fabric.barrier()
     return history
+
+
+def _fabric() -> Fabric:
+    """As many processes as the launcher started, which Fabric does not ask for by itself: one without one."""
+    world = int(os.environ.get("WORLD_SIZE", 1))
+    here = int(os.environ.get("LOCAL_WORLD_SIZE", world))
+    return Fabric(devices=here, num_nodes=world // here, strategy="ddp" if world > 1 else "auto")
 
 
 def _check(config: TrainConfig, shape: ModelConfig) -> None:

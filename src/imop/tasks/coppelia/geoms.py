@@ -1,0 +1,180 @@
+"""Pieces of shapes as MuJoCo geometry: what is seen, and what others bump into."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from imop.tasks.coppelia.model import Model, Piece, Shape
+from imop.types import FloatArray
+
+SEEN_GROUP, UNSEEN_GROUP = 0, 3
+_HELPERS = ("stopper", "boundary", "_resp")
+"""Words in the names of shapes that are only there for the physics, if the file calls them not renderable."""
+_THIN = 0.0005
+"""Half the thickness that collision geometry gets where it has none, metres."""
+_SMALLEST_AREA = 1e-14
+"""Of a triangle, m2."""
+_LARGEST_PICTURE = 512
+_CLEAR = 0.1
+"""Opacity below which something is not drawn."""
+_HULL_VERTICES = 64
+
+
+def is_drawn(shape: Shape, piece: Piece) -> bool:
+    """Whether cameras see a piece. The file's `renderable` is clear on much that is seen, so names decide."""
+    helper = not shape.renderable and any(word in shape.name for word in _HELPERS)
+    return shape.shown and not piece.wireframe and not helper and piece.opacity > _CLEAR
+
+
+@dataclass
+class Assets:
+    """Meshes and pictures that a scene already has; pieces that share arrays share them."""
+
+    spec: Any
+    model: Model
+    prefix: str
+    meshes: dict[tuple[int, int, int, bool], str] = field(default_factory=dict)
+    materials: dict[int, str] = field(default_factory=dict)
+
+    def mesh(self, piece: Piece, hull: bool) -> str | None:
+        """Name of the piece's mesh, None if it has no surface; with `hull` only its convex hull counts."""
+        key = (id(piece.vertices), id(piece.triangles), id(piece.uv), hull)
+        if key in self.meshes:
+            return self.meshes[key]
+        corners = piece.vertices.astype(np.float64)[piece.triangles]
+        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        kept = piece.triangles[area > 2 * _SMALLEST_AREA]
+        if len(kept) == 0:
+            return None
+        name = f"{self.prefix}mesh{len(self.meshes)}"
+        used, faces = np.unique(kept, return_inverse=True)
+        points = _thickened(piece.vertices[used]) if hull else _four(piece.vertices[used])
+        options: dict[str, Any] = {"maxhullvert": _HULL_VERTICES} if hull else {}
+        if piece.uv is not None and not hull:
+            options["usertexcoord"] = piece.uv[area > 2 * _SMALLEST_AREA].reshape(-1).astype(np.float32)
+            options["userfacetexcoord"] = np.arange(3 * len(kept), dtype=np.int32)
+        self.spec.add_mesh(
+            name=name,
+            uservert=points.reshape(-1),
+            userface=faces.astype(np.int32).reshape(-1),
+            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+            if hull
+            else mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+            **options,
+        )
+        self.meshes[key] = name
+        return name
+
+    def material(self, picture: int) -> str:
+        """Name of the material that carries a picture."""
+        if picture not in self.materials:
+            name = f"{self.prefix}picture{len(self.materials)}"
+            pixels = self.model.textures[picture].pixels
+            step = int(np.ceil(max(pixels.shape[:2]) / _LARGEST_PICTURE))
+            small = _averaged(pixels, step)
+            texture = self.spec.add_texture(name=name, type=mujoco.mjtTexture.mjTEXTURE_2D, nchannel=3)
+            texture.height, texture.width = small.shape[:2]
+            texture.data = small.tobytes()
+            material = self.spec.add_material(name=name, rgba=[1, 1, 1, 1])
+            material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
+            self.materials[picture] = name
+        return self.materials[picture]
+
+
+def _averaged(pixels: Any, step: int) -> Any:
+    """The picture (h, w, 3) with squares of `step` pixels averaged to one."""
+    h, w = (max(1, n // step) for n in pixels.shape[:2])
+    cut = pixels[: h * step, : w * step].astype(np.float64)
+    return np.round(cut.reshape(h, step, w, step, 3).mean(axis=(1, 3))).astype(np.uint8)
+
+
+def _four(vertices: Any) -> Any:
+    """Vertices, at least the four that MuJoCo demands."""
+    return vertices if len(vertices) > 3 else np.concatenate([vertices, vertices[:1]])
+
+
+def _thickened(vertices: Any) -> FloatArray:
+    """Vertices whose hull has a volume: those of flat pieces are doubled across the plane."""
+    points = vertices.astype(np.float64)
+    centred = points - points.mean(axis=0)
+    normal = np.linalg.svd(centred, full_matrices=False)[2][-1] if len(points) > 2 else np.array([0, 0, 1.0])
+    along = centred @ normal
+    if along.max() - along.min() >= 2 * _THIN and len(points) > 3:
+        thick: FloatArray = points
+    else:
+        thick = np.concatenate([points - _THIN * normal, points + _THIN * normal])
+    return thick
+
+
+def add_geoms(assets: Assets, body: Any, shape: Shape) -> None:
+    """Give `body`, whose frame is the shape's, everything of the shape that is seen or solid."""
+    for k, piece in enumerate(shape.pieces):
+        name = f"{assets.prefix}{shape.name}" + (f":{k}" if k else "")
+        drawn = is_drawn(shape, piece)
+        primitive = _primitive(piece, solid=shape.respondable)
+        if drawn and piece.uv is None and primitive is not None:
+            _add(body, piece, primitive, name, shape, drawn=True, solid=shape.respondable)
+            continue
+        mesh = assets.mesh(piece, hull=False) if drawn else None
+        if mesh is not None:
+            options = {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": mesh}
+            if piece.texture is not None:
+                options["material"] = assets.material(piece.texture)
+            _add(body, piece, options, name, shape, drawn=True, solid=False)
+        if shape.respondable:
+            solid = primitive or _hull(assets, piece)
+            if solid is not None:
+                _add(body, piece, solid, f"{name}:solid", shape, drawn=False, solid=True)
+
+
+def _hull(assets: Assets, piece: Piece) -> dict[str, Any] | None:
+    mesh = assets.mesh(piece, hull=True)
+    return None if mesh is None else {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": mesh}
+
+
+def _primitive(piece: Piece, solid: bool) -> dict[str, Any] | None:
+    """MuJoCo's geometry of a primitive, half sizes; None if only a mesh will do."""
+    half = np.asarray(piece.size) / 2
+    least = np.maximum(half, _THIN if solid else 1e-5)
+    x, y, z = (float(v) for v in least)
+    if piece.primitive == "plane":
+        return {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": [x, y, _THIN if solid else 1e-4]}
+    if piece.primitive == "cuboid":
+        return {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": [x, y, z]}
+    if piece.primitive == "spheroid":
+        return (
+            {"type": mujoco.mjtGeom.mjGEOM_ELLIPSOID, "size": [x, y, z]}
+            if np.ptp(half) > 1e-6
+            else {"type": mujoco.mjtGeom.mjGEOM_SPHERE, "size": [x, 0, 0]}
+        )
+    if piece.primitive in ("cylinder", "disc") and abs(half[0] - half[1]) < 1e-6:
+        return {
+            "type": mujoco.mjtGeom.mjGEOM_CYLINDER,
+            "size": [x, z if piece.primitive == "cylinder" else _THIN, 0],
+        }
+    if piece.primitive == "capsule" and z > x:
+        return {"type": mujoco.mjtGeom.mjGEOM_CAPSULE, "size": [x, z - x, 0]}
+    return None
+
+
+def _add(
+    body: Any, piece: Piece, options: dict[str, Any], name: str, shape: Shape, drawn: bool, solid: bool
+) -> None:
+    T = piece.T_shape_mesh
+    # MuJoCo reads exactly this grey as "the material's colour".
+    rgb = [0.501 if abs(c - 0.5) < 1e-3 else c for c in piece.color]
+    body.add_geom(
+        name=name,
+        pos=T[:3, 3],
+        quat=Rotation.from_matrix(T[:3, :3]).as_quat(scalar_first=True),
+        rgba=[*rgb, 1.0],
+        group=SEEN_GROUP if drawn else UNSEEN_GROUP,
+        contype=int(solid),
+        conaffinity=int(solid),
+        friction=[shape.friction, 0.005, 0.0001],
+        mass=0,
+        **options,
+    )
