@@ -8,6 +8,7 @@ propose motions, and what the cameras saw decides between them and refines the b
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 import torch
@@ -30,6 +31,8 @@ from imop.types import FloatArray
 
 # A region of fewer points cannot be matched.
 FEWEST = 8
+# Matches nearer than this to where a motion carries them speak for it, metres.
+LOOSE = 0.03
 # What stands this near to the region (metres) is its context.
 AROUND = 0.1
 
@@ -116,8 +119,8 @@ class LearnedStep:
             return ()
         matches = self._matches(found, seen)
         fit = reposition(found.last, found.p_region, found.p_query).double().numpy()
-        inquiry = Inquiry(self._search, query, things, hints)
-        if agreement(fit, matches.x, matches.y, matches.weight)[0] > self._matcher.trusted:
+        inquiry = Inquiry(self._search, query, things, hints, partial(matches.agreement, tolerance=LOOSE))
+        if matches.agreement(fit)[0] > self._matcher.trusted:
             confirmed = inquiry.confirm(fit[0])
             if confirmed:
                 return confirmed
@@ -165,6 +168,10 @@ class _Matches:
     y: FloatArray
     n_y: FloatArray
     weight: FloatArray
+
+    def agreement(self, T: FloatArray, tolerance: float = 0.015) -> FloatArray:
+        """(H,) share of the matches that each motion (H, 4, 4) carries nearer than `tolerance`, metres."""
+        return agreement(T, self.x, self.y, self.weight, tolerance)
 
 
 def _surface(graph: Graph) -> tuple[Tensor, Tensor]:

@@ -1,6 +1,6 @@
 """From many guesses where a region went to few that explain what is seen: judge, refine, judge again."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,8 @@ from imop.policy.matcher import Hypothesis, Scene
 from imop.policy.refine import FINEST, Refiner, upright
 from imop.policy.region import Region
 from imop.types import BoolArray, FloatArray
+
+Opinion = Callable[[FloatArray], FloatArray]
 
 # Things do not lean: a motion that tilts by this angle (radians) or more is as unlikely as any other tilt.
 TILTED = 0.17
@@ -39,6 +41,7 @@ class SearchConfig:
         tilt: share that it loses for tilting things by `TILTED` or more.
         change: share that it loses for another place than the demonstrated motion leads to.
         sure: score from which a trusted motion needs no search.
+        opinion: what full support by the matcher's opinion adds to the score when motions are compared.
     """
 
     refined: int = 12
@@ -49,6 +52,7 @@ class SearchConfig:
     tilt: float = 0.35
     change: float = 0.12
     sure: float = 0.7
+    opinion: float = 0.15
 
 
 class Search:
@@ -87,17 +91,23 @@ class Inquiry:
         query: the observed scene.
         things: at least 5 points of it, all that the region may be.
         hints: motions (4, 4) that are tried in any case.
+        opinion: the matcher's support, 0 .. 1, of motions (H, 4, 4), beside what the cameras saw.
     """
 
     def __init__(
-        self, search: Search, query: Scene, things: PointCloud, hints: Sequence[FloatArray] = ()
+        self,
+        search: Search,
+        query: Scene,
+        things: PointCloud,
+        hints: Sequence[FloatArray] = (),
+        opinion: Opinion | None = None,
     ) -> None:
         self._search, self._config, self._center = search, search.config, search.center
         self._judge = Judge(search.template, Surface(things, query.observation.views))
         self._refine = Refiner(things.points)
         self._T_repeated = query.observation.T_world_gripper @ se3.invert(search.T_world_gripper)
         self._likely = np.stack([*hints, np.eye(4), self._T_repeated])
-        self._begun = bool(hints)
+        self._begun, self._opinion = bool(hints), opinion
 
     def confirm(self, T: FloatArray) -> tuple[Hypothesis, ...]:
         """The motions next to a trusted one (4, 4), best first; none if it does not explain the scene.
@@ -135,7 +145,9 @@ class Inquiry:
         found = [found[i] for i in distinct(motions, self._center, len(found), *SAME_MOTION)]
         # The last half millimetre is worth looking for only where it matters.
         found = _best(found + [self._finished(h.T_query_support) for h in found[: self._config.finished]])
-        return self._ordered(found + [self._upright(h.T_query_support) for h in found[: self._config.righted]])
+        return self._ordered(
+            found + [self._upright(h.T_query_support) for h in found[: self._config.righted]]
+        )
 
     def _refined(self, T: FloatArray, part: int = -1) -> Hypothesis:
         return self._judge.judge(self._refine(self._search.coarse[part], T))
@@ -168,9 +180,12 @@ class Inquiry:
     def _ordered(self, found: list[Hypothesis]) -> tuple[Hypothesis, ...]:
         """The different ones among hypotheses, preferred first."""
         preference = np.array([self._preference(hypothesis) for hypothesis in found])
-        ordered = [found[i] for i in np.argsort(-preference, kind="stable")]
-        motions = np.stack([hypothesis.T_query_support for hypothesis in ordered])
-        return tuple(ordered[i] for i in distinct(motions, self._center, len(ordered)))
+        motions = np.stack([hypothesis.T_query_support for hypothesis in found])
+        if self._opinion is not None:
+            support = self._opinion(motions)
+            preference += self._config.opinion * support / max(support.max(), 1e-9)
+        order = np.argsort(-preference, kind="stable")
+        return tuple(found[order[i]] for i in distinct(motions[order], self._center, len(found)))
 
     def _preference(self, hypothesis: Hypothesis) -> float:
         """The score, less for moving otherwise than demonstrated and for tilting what stands on a table.
