@@ -14,12 +14,12 @@ HERE, THERE = at(0.1, 0.1), at(0.3, -0.2, yaw=1.2)
 T = THERE @ se3.invert(HERE)
 
 
-def inquiry(poses, hints=(), T_world_gripper=HOME):
+def inquiry(poses, hints=(), opinion=None):
     cloud = box(SIZE, RED, HERE)
     region = Region(cloud, np.ones(len(cloud)), np.zeros((0, 3)))
     search = Search(SearchConfig(turned=2), scene([cloud], HOME), region)
-    query = scene([box(SIZE, RED, pose, seed=1 + k) for k, pose in enumerate(poses)], T_world_gripper)
-    return Inquiry(search, query, find_objects(query.cloud, query.ground.plane).cloud, hints)
+    query = scene([box(SIZE, RED, pose, seed=1 + k) for k, pose in enumerate(poses)], HOME)
+    return Inquiry(search, query, find_objects(query.cloud, query.ground.plane).cloud, hints, opinion)
 
 
 def test_a_motion_that_is_nearly_right_is_confirmed_and_mended():
@@ -45,3 +45,15 @@ def test_of_equal_turns_the_demonstrated_one_is_preferred():
     best = inquiry([at(0.3, -0.2)]).confirm(half_turn)[0]
     assert se3.rotation_distance(best.T_query_support, np.eye(4)) < 0.05
     assert abs(best.T_query_support[2, 3]) < 0.003
+
+
+def test_the_matchers_opinion_decides_between_equal_explanations():
+    other = at(0.0, 0.2)
+    motions = [pose @ se3.invert(HERE) for pose in (THERE, other)]
+    for wanted in motions:
+
+        def opinion(T, wanted=wanted):
+            return (se3.translation_distance(T @ HERE, wanted @ HERE) < 0.02).astype(float)
+
+        best = inquiry([THERE, other], opinion=opinion).search(np.stack(motions))[0]
+        assert se3.translation_distance(best.T_query_support @ HERE, wanted @ HERE) < 0.01
