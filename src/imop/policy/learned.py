@@ -27,6 +27,7 @@ from imop.policy.matcher import Hypothesis, Scene, Transition
 from imop.policy.objects import connected, find_objects
 from imop.policy.region import Region
 from imop.policy.search import Inquiry, Search, SearchConfig, middle, upright_motions
+from imop.policy.symmetry import equal_turns
 from imop.types import FloatArray
 
 # A region of fewer points cannot be matched.
@@ -61,7 +62,7 @@ class LearnedMatcher:
     places: int = 2
     turns: int = 24
     search: SearchConfig = field(
-        default_factory=lambda: SearchConfig(refined=6, finished=2, righted=3, turned=2)
+        default_factory=lambda: SearchConfig(refined=6, finished=2, righted=3, turned=2, turn=0.05, sure=0.65)
     )
     seed: int = 0
 
@@ -93,6 +94,7 @@ class LearnedStep:
         if self._region.context is not None:
             self._middles.append(middle(self._region.whole.points))
         self._search = Search(matcher.search, step.before, self._region)
+        self._turns = equal_turns(self._search.template.surface, self._middles[0])
 
     def _inside(self, probability: Tensor) -> Tensor:
         """(R,) points of the region, in order of their index; the likeliest few if there seems to be none."""
@@ -119,7 +121,7 @@ class LearnedStep:
             return ()
         matches = self._matches(found, seen)
         fit = reposition(found.last, found.p_region, found.p_query).double().numpy()
-        inquiry = Inquiry(self._search, query, things, hints, partial(matches.agreement, tolerance=LOOSE))
+        inquiry = Inquiry(self._search, query, things, hints, partial(self._opinion, matches))
         if matches.agreement(fit)[0] > self._matcher.trusted:
             confirmed = inquiry.confirm(fit[0])
             if confirmed:
@@ -134,6 +136,12 @@ class LearnedStep:
         x, n_x = (t[self._chosen][i].double().numpy() for t in _surface(self._graph))
         y, n_y = (t[best.flatten()].double().numpy() for t in _surface(seen))
         return _Matches(x, n_x, y, n_y, weight.flatten().double().numpy() * self._probability[i] + 1e-6)
+
+    def _opinion(self, m: "_Matches", T: FloatArray) -> FloatArray:
+        """(H,) share of the matches that speak for motions (H, 4, 4), in any of the equal turns."""
+        turned = (T[:, None] @ self._turns).reshape(-1, 4, 4)
+        support: FloatArray = m.agreement(turned, LOOSE).reshape(len(T), -1).max(axis=1)
+        return support
 
     def _sampled(self, m: "_Matches") -> FloatArray:
         """(H, 4, 4) motions that some matches agree on."""

@@ -1,0 +1,40 @@
+"""Turns that change nothing, on boxes and cylinders seen from all sides."""
+
+import numpy as np
+import pytest
+
+from imop.geometry import se3
+from imop.policy.evidence import Surface
+from imop.policy.symmetry import equal_turns
+from tests.policy.scenes import RED, TABLE, at, box, camera, colored
+
+VIEWS = {"above": camera()}
+CENTER = np.array([0.1, 0.1, TABLE])
+
+
+def can(radius=0.04, height=0.08, spacing=0.004):
+    rng = np.random.default_rng(0)
+    count = int(2 * np.pi * radius * height / spacing**2)
+    angle = rng.uniform(0, 2 * np.pi, count)
+    out = np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=1)
+    points = radius * out + rng.uniform(0, height, count)[:, None] * [0, 0, 1] + CENTER
+    return colored(points, out, RED)
+
+
+def angles(cloud):
+    turns = equal_turns(Surface(cloud, VIEWS), CENTER)
+    assert np.array_equal(turns[0], np.eye(4))
+    return np.degrees(se3.rotation_distance(turns, np.eye(4))).round()
+
+
+def test_a_can_looks_the_same_in_every_turn():
+    assert len(angles(can())) == 8
+
+
+def test_a_cube_looks_the_same_in_four_turns():
+    assert sorted(angles(box((0.06, 0.06, 0.06), RED, at(0.1, 0.1)))) == [0, 90, 90, 180]
+
+
+@pytest.mark.parametrize("size", [(0.12, 0.03, 0.04), (0.2, 0.1, 0.02)])
+def test_half_a_turn_alone_is_not_trusted(size):
+    assert list(angles(box(size, RED, at(0.1, 0.1)))) == [0]
