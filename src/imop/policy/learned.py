@@ -32,6 +32,8 @@ from imop.types import FloatArray
 
 # A region of fewer points cannot be matched.
 FEWEST = 8
+# Share of what is held in the region of a step that lets go from which nothing else is in it.
+LETS_GO = 0.8
 # Matches nearer than this to where a motion carries them speak for it, metres.
 LOOSE = 0.03
 # What stands this near to the region (metres) is its context.
@@ -204,12 +206,16 @@ def _dense(
     # The bare table is found everywhere.
     standing = ~step.before.ground.bare
     member = member & standing if (member & standing).sum() >= FEWEST else member
-    region = cloud.select(member)
     p_held = se3.apply(step.before.observation.T_world_gripper, p_gripper_held)
-    if len(p_held) and within(p_held, region.points, SAME).mean() > 0.5:
-        p_held, p_gripper_held = p_held[:0], p_gripper_held[:0]
-    rest = cloud.select(standing & ~member)
+    in_hand = within(cloud.points, p_held, SAME) if len(p_held) else np.zeros(len(cloud), dtype=bool)
+    # A step that lets go is fixed to what stays, not to what is let go.
+    most = LETS_GO if step.action.gripper_open else 0.5
+    if (member & ~in_hand).sum() >= FEWEST and in_hand[member].mean() < most:
+        member = member & ~in_hand
+    else:
+        in_hand, p_gripper_held = np.zeros(len(cloud), dtype=bool), p_gripper_held[:0]
+    region = cloud.select(member)
+    rest = cloud.select(standing & ~member & ~in_hand)
     around = within(rest.points, region.points, AROUND)
-    around &= ~within(rest.points, p_held, SAME) if len(p_held) else True
     context = rest.select(around) if around.any() else None
     return Region(region, weight[owner[member]], p_gripper_held, context)

@@ -52,7 +52,7 @@ class SearchConfig:
     tilt: float = 0.35
     change: float = 0.12
     sure: float = 0.7
-    opinion: float = 0.15
+    opinion: float = 0.04
 
 
 class Search:
