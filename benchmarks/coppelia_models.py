@@ -53,7 +53,7 @@ def drift(world: World, names: list[str]) -> dict[str, float]:
 
 
 def measure(path: Path, out: Path) -> dict[str, Any]:
-    """Seconds from the file to a world, without and with a cache, and for all cameras; metres moved in 1 s."""
+    """Seconds to a world, without and with a cache, and for all cameras; metres moved in a second."""
     seconds = {}
     with TemporaryDirectory() as cache:
         for name in ("cold", "cached"):
