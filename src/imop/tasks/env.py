@@ -207,7 +207,8 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
         steps = self.observation.time_step + 1
         info: dict[str, Any] = {"success": False}
         try:
-            execute(self.world, to_action(action), on_frame=watching(self.task, self.on_frame))
+            watch = watching(self.task, self.on_frame)
+            execute(self.world, to_action(action), on_frame=watch, insist=self.task.insist)
             info["success"] = self.task.success(self.world)
         except PlanFailed as error:
             info["plan_failed"] = error.reason

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 from imop.errors import ImopError, PlanFailed
 from imop.sim.cameras import observe
-from imop.sim.execute import move
+from imop.sim.execute import move, plan_for
 from imop.sim.gripper import PERIOD_STEPS, OnFrame, set_gripper
-from imop.sim.motion import Planner
 from imop.sim.world import World
 from imop.tasks.task import Task, make_scene, watching
 from imop.tasks.waypoint import Waypoint
@@ -66,7 +65,7 @@ def perform(task: Task, world: World, on_frame: OnFrame | None = None) -> Demons
     keyframes = []
     for step in range(count):
         try:
-            keyframes.append(_follow(world, task.waypoints(world)[step], step, watch))
+            keyframes.append(_follow(world, task.waypoints(world)[step], step, watch, task.insist))
         except PlanFailed as error:
             raise ExpertFailed(task.name, step, error.reason) from error
     for _ in range(_EXTRA_PERIODS):
@@ -79,11 +78,11 @@ def perform(task: Task, world: World, on_frame: OnFrame | None = None) -> Demons
     return Demonstration(tuple(keyframes), observe(world, time_step=count), task=task.name)
 
 
-def _follow(world: World, waypoint: Waypoint, step: int, on_frame: OnFrame | None) -> Keyframe:
+def _follow(world: World, waypoint: Waypoint, step: int, on_frame: OnFrame | None, insist: bool) -> Keyframe:
     observation = observe(world, time_step=step)
     T_world_object = world.pose(waypoint.frame)
     # Like a policy's actions: straight where possible. Scenes are chosen so that linear waypoints are.
-    plan = Planner(world).plan(waypoint.target(world), waypoint.allow_collisions)
+    plan = plan_for(world, waypoint.target(world), waypoint.allow_collisions, insist=insist)
     move(world, plan, on_frame)
     action = Action(world.T_world_gripper, waypoint.gripper_open, waypoint.allow_collisions)
     set_gripper(world, waypoint.gripper_open, on_frame)

@@ -19,12 +19,14 @@ class Task(ABC):
         name: "suite/name".
         variations: how many aims there are (which drawer, which colour).
         step_limit: how many actions an episode may take.
+        insist: whether a motion that would touch something is made all the same if there is no other.
         graspable: bodies that the gripper may attach.
     """
 
     name: ClassVar[str]
     variations: ClassVar[int] = 1
     step_limit: ClassVar[int] = 25
+    insist: ClassVar[bool] = False
     graspable: tuple[str, ...] = ()
 
     @abstractmethod

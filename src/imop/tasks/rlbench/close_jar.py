@@ -40,4 +40,7 @@ class CloseJar(RLBenchTask):
         self.frames = lid | dict.fromkeys(("waypoint3", "waypoint4", "waypoint5"), f"jar{target}")
 
     def conditions(self) -> Sequence[Condition]:
-        return [NothingGrasped(), Detected("jar_lid0", "success")]
+        return [
+            NothingGrasped(),
+            Detected("jar_lid0", "success"),
+        ]

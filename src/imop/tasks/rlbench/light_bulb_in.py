@@ -36,4 +36,7 @@ class LightBulbIn(RLBenchTask):
         self.frames = dict.fromkeys(("waypoint0", "waypoint1"), f"bulb_phys{target}")
 
     def conditions(self) -> Sequence[Condition]:
-        return [Detected(f"bulb_phys{self.variation % 2}", "success"), NothingGrasped()]
+        return [
+            Detected(f"bulb_phys{self.variation % 2}", "success"),
+            NothingGrasped(),
+        ]

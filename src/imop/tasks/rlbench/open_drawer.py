@@ -29,4 +29,6 @@ class OpenDrawer(RLBenchTask):
         scene.move_to("waypoint1", f"waypoint_anchor_{LEVELS[self.variation]}")
 
     def conditions(self) -> Sequence[Condition]:
-        return [JointMoved(f"drawer_joint_{LEVELS[self.variation]}", 0.15)]
+        return [
+            JointMoved(f"drawer_joint_{LEVELS[self.variation]}", 0.15),
+        ]

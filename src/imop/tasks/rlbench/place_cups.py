@@ -45,4 +45,7 @@ class PlaceCups(RLBenchTask):
         return steps
 
     def conditions(self) -> Sequence[Condition]:
-        return [NothingGrasped(), DetectedSeveral(MUGS, SENSORS, self.variation + 1)]
+        return [
+            NothingGrasped(),
+            DetectedSeveral(MUGS, SENSORS, self.variation + 1),
+        ]

@@ -40,4 +40,6 @@ class PlaceShapeInShapeSorter(RLBenchTask):
         ]
 
     def conditions(self) -> Sequence[Condition]:
-        return [Detected(SHAPES[self.variation], "success")]
+        return [
+            Detected(SHAPES[self.variation], "success"),
+        ]

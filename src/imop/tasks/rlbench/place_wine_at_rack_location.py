@@ -34,4 +34,7 @@ class PlaceWineAtRackLocation(RLBenchTask):
         return [Step(name, frame=None if k < 3 else "rack_bottom") for k, name in enumerate(way)]
 
     def conditions(self) -> Sequence[Condition]:
-        return [Detected("wine_bottle", f"success_{PLACES[self.variation]}"), NothingGrasped()]
+        return [
+            Detected("wine_bottle", f"success_{PLACES[self.variation]}"),
+            NothingGrasped(),
+        ]

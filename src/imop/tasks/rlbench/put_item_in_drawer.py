@@ -33,4 +33,6 @@ class PutItemInDrawer(RLBenchTask):
         scene.move_to("waypoint2", f"waypoint_anchor_{LEVELS[self.variation]}")
 
     def conditions(self) -> Sequence[Condition]:
-        return [Detected("item", f"success_{LEVELS[self.variation]}")]
+        return [
+            Detected("item", f"success_{LEVELS[self.variation]}"),
+        ]

@@ -31,4 +31,7 @@ class PutMoneyInSafe(RLBenchTask):
         self.boundary(scene, rng, "dollar_stack_boundary").sample("dollar_stack", yaw=(0.0, np.pi / 2))
 
     def conditions(self) -> Sequence[Condition]:
-        return [NothingGrasped(), Detected("dollar_stack", f"success_detector{self.variation}")]
+        return [
+            NothingGrasped(),
+            Detected("dollar_stack", f"success_detector{self.variation}"),
+        ]

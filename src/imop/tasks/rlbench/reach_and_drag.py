@@ -33,4 +33,6 @@ class ReachAndDrag(RLBenchTask):
             scene.paint(f"distractor{k}", NAMES[(self.variation + 4 + k) % len(NAMES)])
 
     def conditions(self) -> Sequence[Condition]:
-        return [Detected("cube", "success0")]
+        return [
+            Detected("cube", "success0"),
+        ]

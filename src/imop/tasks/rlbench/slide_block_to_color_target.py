@@ -33,4 +33,6 @@ class SlideBlockToColorTarget(RLBenchTask):
         return [Step(f"waypoint{k}", scene.pose(points[k]), frames[k]) for k in range(len(points))]
 
     def conditions(self) -> Sequence[Condition]:
-        return [Detected("block", f"success{self.variation + 1}")]
+        return [
+            Detected("block", f"success{self.variation + 1}"),
+        ]

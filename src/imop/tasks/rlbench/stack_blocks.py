@@ -61,4 +61,7 @@ class StackBlocks(RLBenchTask):
         return steps
 
     def conditions(self) -> Sequence[Condition]:
-        return [DetectedSeveral(BLOCKS, ("stack_blocks_success",), self.height), NothingGrasped()]
+        return [
+            DetectedSeveral(BLOCKS, ("stack_blocks_success",), self.height),
+            NothingGrasped(),
+        ]

@@ -37,4 +37,8 @@ class StackCups(RLBenchTask):
             room.sample(cup, yaw=(0.0, 0.0), min_distance=0.05)
 
     def conditions(self) -> Sequence[Condition]:
-        return [Detected("cup1", "success"), Detected("cup3", "success"), NothingGrasped()]
+        return [
+            Detected("cup1", "success"),
+            Detected("cup3", "success"),
+            NothingGrasped(),
+        ]

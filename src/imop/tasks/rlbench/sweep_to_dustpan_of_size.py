@@ -32,4 +32,6 @@ class SweepToDustpanOfSize(RLBenchTask):
         return [Step("waypoint0"), Step("waypoint1"), *sweep]
 
     def conditions(self) -> Sequence[Condition]:
-        return [DetectedSeveral(DIRT, (f"success_{PANS[self.variation]}",), len(DIRT))]
+        return [
+            DetectedSeveral(DIRT, (f"success_{PANS[self.variation]}",), len(DIRT)),
+        ]

@@ -11,7 +11,7 @@ import numpy as np
 from imop.errors import PlanFailed
 from imop.geometry import se3
 from imop.sim.kinematics import inverse_kinematics
-from imop.sim.motion import Planner
+from imop.sim.motion import WORKSPACE_LOWER, Planner
 from imop.sim.robot import PANDA_HOME_Q
 from imop.sim.world import World
 from imop.tasks.checks import settle, touched
@@ -30,6 +30,8 @@ from imop.types import FloatArray
 
 DOWN = se3.euler(x=np.pi) @ se3.euler(z=np.pi)
 """Orientation of the tip that looks down, its x axis towards the robot's base."""
+_ABOVE_FLOOR = 0.0002
+"""Things that sank onto the table may put waypoints below the workspace, by two millimetres."""
 _ATTEMPTS = 100
 _DRAWS = 100
 
@@ -76,6 +78,7 @@ class RLBenchTask(Task):
         frames: waypoint -> body on which it depends, where that is not the shape it hangs on.
     """
 
+    insist = True
     words: ClassVar[tuple[str, ...]]
     aims: ClassVar[tuple[str, ...]] = ("",)
     yaw: ClassVar[tuple[float, float]] = (-3.14, 3.14)
@@ -178,7 +181,8 @@ class RLBenchTask(Task):
             T = scene.pose(step.waypoint) if step.T_world_tip is None else step.T_world_tip
             frame = step.frame or self.frames.get(step.waypoint) or thing_of(self.model, step.waypoint)
             o = self.model[step.waypoint]
-            poses = T @ path_poses(o) if isinstance(o, PathObject) else T[None]
+            poses = T @ path_poses(o) if isinstance(o, PathObject) else T[None].copy()
+            poses[:, 2, 3] = np.maximum(poses[:, 2, 3], WORKSPACE_LOWER[2] + _ABOVE_FLOOR)
             T_frame_poses = se3.invert(scene.pose(frame)) @ poses
             for k, T_frame_gripper in enumerate(T_frame_poses):
                 last = k == len(poses) - 1
