@@ -40,18 +40,21 @@ class Shifted(Camera):
         return K
 
 
-def inverse_depth(world, shift):
-    cameras = {n: Shifted(**vars(CAMERAS[n]), shift=shift) for n in POLICY_CAMERAS}
+def inverse_depth(world, observation, shift):
+    # Where the cameras were: the one on the hand is a millimetre off where our arm would hold it.
+    where = {n: view.T_world_camera for n, view in observation.views.items()}
+    optics = {n: (CAMERAS[n].field_of_view, CAMERAS[n].far) for n in where}
+    cameras = {n: Shifted(T, *optics[n], shift=shift) for n, T in where.items()}
     with np.errstate(divide="ignore"):
         return {n: 1 / view.depth.astype(np.float64) for n, view in render(world, cameras=cameras).items()}
 
 
-def as_recorded(world):
+def as_recorded(world, observation):
     """Depth images as CoppeliaSim makes them."""
-    centre = inverse_depth(world, (0.5, 0.5))
+    centre = inverse_depth(world, observation, (0.5, 0.5))
     steps = [
         # Of the steps to both sides the smaller, for one may lead over an edge.
-        [inverse_depth(world, (0.5 + a * h, 0.5 + b * h)) for h in (-0.2, 0.2)]
+        [inverse_depth(world, observation, (0.5 + a * h, 0.5 + b * h)) for h in (-0.2, 0.2)]
         for a, b in ((1, 0), (0, 1))
     ]
     depth = {}
@@ -76,7 +79,7 @@ def test_depth_of_open_drawer(rlbench_models, rlbench_demos, number):
         for level, k in OPENINGS.items():
             world.set_joint(f"drawer_joint_{level}", state[k])
         world.set_robot(observation.joint_positions, observation.gripper_opening)
-        plain, corrected = render(world), as_recorded(world)
+        plain, corrected = render(world), as_recorded(world, observation)
         for name in POLICY_CAMERAS:
             recorded = observation.views[name]
             seen = np.isin(recorded.instance_ids, 96 + 15 * number + np.array(PARTS))
