@@ -1,4 +1,4 @@
-"""What counts as one thing in the images' instance ids."""
+"""What counts as one thing in the images, and what motion planning avoids."""
 
 import numpy as np
 
@@ -23,3 +23,14 @@ def separate(world: World, model: Model) -> None:
         world.instances[body] = body if own else world.instances[parent] if body != base else base
     for body in np.unique(world.instances[world.instances > 0]):
         world.instance_names.setdefault(int(body), world.model.body(int(body)).name)
+
+
+def unavoided(world: World, model: Model) -> frozenset[int]:
+    """Bodies that motion planning ignores: neither they nor what is drawn for them is called collidable."""
+    avoided = {i for i, o in enumerate(model.objects) if isinstance(o, Shape) and o.collidable}
+    for i in sorted(avoided, reverse=True):
+        o = model.objects[i]
+        if isinstance(o, Shape) and not o.respondable:
+            avoided.add(o.parent)
+    shapes = [o.name for i, o in enumerate(model.objects) if isinstance(o, Shape) and i not in avoided]
+    return frozenset(int(world.model.body(name).id) for name in shapes)

@@ -10,7 +10,7 @@ import numpy as np
 from imop.sim.world import CONTACT_SOLREF
 from imop.tasks.coppelia.model import Model
 from imop.tasks.rlbench.conditions import Condition, Detected
-from imop.tasks.rlbench.loosened import loosened
+from imop.tasks.rlbench.edits import loosened
 from imop.tasks.rlbench.scene import Scene
 from imop.tasks.rlbench.task import RLBenchTask
 

@@ -5,7 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from imop.tasks.coppelia.model import Model
 from imop.tasks.rlbench.conditions import Condition, Detected
+from imop.tasks.rlbench.edits import hollow
 from imop.tasks.rlbench.scene import Scene
 from imop.tasks.rlbench.task import RLBenchTask, Step, carried
 
@@ -25,6 +27,9 @@ class PlaceShapeInShapeSorter(RLBenchTask):
         "slot the {} into the shape sorter",
     )
     graspable = SHAPES
+
+    def load(self) -> Model:
+        return hollow(super().load(), "shape_sorter_visual")
 
     def init_episode(self, scene: Scene, rng: np.random.Generator) -> None:
         room = self.boundary(scene, rng, "boundary")

@@ -13,14 +13,14 @@ from imop.geometry import se3
 from imop.sim.kinematics import inverse_kinematics
 from imop.sim.motion import WORKSPACE_LOWER, Planner
 from imop.sim.robot import PANDA_HOME_Q
-from imop.sim.world import World
+from imop.sim.world import ROBOT, World
 from imop.tasks.checks import settle, touched
 from imop.tasks.coppelia.convert import add_model
 from imop.tasks.coppelia.model import Model, PathObject
 from imop.tasks.layout import NoRoom
 from imop.tasks.rlbench import assets
 from imop.tasks.rlbench.conditions import Condition
-from imop.tasks.rlbench.instances import separate
+from imop.tasks.rlbench.instances import separate, unavoided
 from imop.tasks.rlbench.scene import Scene
 from imop.tasks.rlbench.spawn import WORKSPACE, Boundary, area, place_in
 from imop.tasks.rlbench.waypoints import numbered, path_poses, read_words, thing_of
@@ -32,6 +32,9 @@ DOWN = se3.euler(x=np.pi) @ se3.euler(z=np.pi)
 """Orientation of the tip that looks down, its x axis towards the robot's base."""
 _ABOVE_FLOOR = 0.0002
 """Things that sank onto the table may put waypoints below the workspace, by two millimetres."""
+_TABLE_FRICTION = 0.3
+"""MuJoCo takes the greater friction of two things, the physics of RLBench the product."""
+_ON_THE_WAY, _DEPTH = 12, 0.003
 _ATTEMPTS = 100
 _DRAWS = 100
 
@@ -49,6 +52,14 @@ class Step:
     waypoint: str
     T_world_tip: FloatArray | None = None
     frame: str | None = None
+
+
+def _arm_hits(world: World) -> bool:
+    """Whether a link of the arm, not of the hand, is in something."""
+    links = [world.model.body(f"{ROBOT}link{i}").id for i in range(1, 8)]
+    contacts = world.data.contact[: world.data.ncon]
+    bodies = [world.model.geom_bodyid[c.geom] for c in contacts if c.dist < -_DEPTH]
+    return any((a in links) != (b in links) and not {int(a), int(b)} <= world.robot_bodies for a, b in bodies)
 
 
 def carried(
@@ -114,6 +125,8 @@ class RLBenchTask(Task):
         self.variation = variation
         self.model = self.load()
         add_model(spec, self.model)
+        for geom in spec.body("table").geoms:
+            geom.friction[0] = _TABLE_FRICTION
 
     def init_episode(self, scene: Scene, rng: np.random.Generator) -> None:
         """Arrange the variation's scene, before the task is placed as a whole; nothing by default.
@@ -129,6 +142,7 @@ class RLBenchTask(Task):
     def reset(self, world: World, rng: np.random.Generator) -> None:
         scene = Scene(world, self.model)
         separate(world, self.model)
+        world.unavoided = unavoided(world, self.model)
         untouched = world.save_state()
         problem = ""
         for _ in range(_ATTEMPTS):
@@ -167,7 +181,11 @@ class RLBenchTask(Task):
         try:
             for w in steps:
                 plan = Planner(world).plan(w.target(world), allow_collisions=True, linear=w.linear)
-                world.set_robot(plan.positions[-1], 1.0)
+                steps_of_plan = np.linspace(0, len(plan.positions) - 1, _ON_THE_WAY).astype(int)
+                for q in plan.positions[steps_of_plan]:
+                    world.set_robot(q, 1.0)
+                    if _arm_hits(world):
+                        return "the arm would hit something"
         except PlanFailed as error:
             return error.reason
         finally:
