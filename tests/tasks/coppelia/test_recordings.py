@@ -45,8 +45,8 @@ def inverse_depth(world, observation, shift):
     where = {n: view.T_world_camera for n, view in observation.views.items()}
     optics = {n: (CAMERAS[n].field_of_view, CAMERAS[n].far) for n in where}
     cameras = {n: Shifted(T, *optics[n], shift=shift) for n, T in where.items()}
-    with np.errstate(divide="ignore"):
-        return {n: 1 / view.depth.astype(np.float64) for n, view in render(world, cameras=cameras).items()}
+    views = render(world, cameras=cameras)
+    return {n: 1 / np.where(v.depth > 0, v.depth.astype(np.float64), np.inf) for n, v in views.items()}
 
 
 def as_recorded(world, observation):
@@ -60,7 +60,7 @@ def as_recorded(world, observation):
     depth = {}
     for n, z in centre.items():
         slopes = [np.minimum(abs(low[n] - z), abs(high[n] - z)) / 0.2 for low, high in steps]
-        depth[n] = 1 / (z - FACTOR * np.maximum(*slopes))
+        depth[n] = 1 / np.maximum(z - FACTOR * np.maximum(*slopes), 1e-3)
     return depth
 
 
