@@ -4,7 +4,7 @@ Two demonstrations of the same procedural scene, things placed anew: the matcher
 every step's pose over to the state before the same step of the second, with its own answer to the step before
 as a hint, as the policy does. A pose is right if it is near one of
 those that the known symmetries and equal things allow. Only steps of which both sides see enough count, as in
-training. No routing: see `imop train --networks routing`, whose validation reports it.
+training. Routing is measured by benchmarks/routing.py.
 
     python benchmarks/held_out.py --pairs 300 --seed 7 --json held_out.json
 """

@@ -32,6 +32,14 @@ class ModelFormatError(ImopError):
         super().__init__(f"model: {problem} at byte {offset}; expected: {expected}")
 
 
+class AssetMissing(ImopError):
+    """A task needs a file that we may not distribute; `command` provides it."""
+
+    def __init__(self, file: str, command: str):
+        self.file, self.command = file, command
+        super().__init__(f"{file}: not there; provide it with: {command}")
+
+
 PlanFailure = Literal[
     "outside_workspace",
     "unreachable",

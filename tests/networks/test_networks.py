@@ -8,12 +8,10 @@ from imop.networks.blocks import relation
 from imop.networks.graph import POINT_FEATURES, Graph, Level, build_graph, collate, nearest_neighbours
 from imop.networks.matching import MatchingConfig, MatchingNetwork, dual_softmax, reposition
 from imop.networks.region import GRIPPER_FEATURES, RegionConfig, RegionNetwork, StepBatch
-from imop.networks.routing import HAND_FEATURES, UNKNOWN, RoutingConfig, RoutingNetwork, States
 from tests.networks.scenes import SMALL, tabletop
 
 TINY = BackboneConfig(widths=(16, 16, 16))
 REGION = RegionConfig(backbone=BackboneConfig(POINT_FEATURES + GRIPPER_FEATURES, widths=(16, 16, 16)))
-ROUTING = RoutingConfig(BackboneConfig(POINT_FEATURES + HAND_FEATURES, widths=(16, 16, 16)), width=32)
 GOAL = se3.make(se3.euler(x=np.pi), (0.1, 0.05, 0.87))
 NOW = se3.make(se3.euler(x=np.pi), (0.2, 0.0, 1.2))
 
@@ -188,65 +186,6 @@ def test_every_parameter_of_the_matching_network_learns(attention):
     # Before the first repositioning nothing is known about who is near whom.
     unused = ("region_cross.0.attention.position.0", "query_cross.0.attention.position.0")
     assert all(name.startswith(unused) for name in silent), silent
-
-
-def states(graphs, steps, T=GOAL):
-    """States with the gripper at `T`, the first ones more open."""
-    poses = torch.from_numpy(np.stack([T] * len(graphs)).astype(np.float32))
-    opening = torch.linspace(1.0, 0.0, len(graphs))
-    return States(collate(graphs), poses, opening, torch.tensor(steps, dtype=torch.float32))
-
-
-def chosen(batch, index):
-    """Some of the states, in the given order; `batch` is of graphs of a list."""
-    graphs, s = batch
-    rest = (s.T_world_gripper[index], s.opening[index], s.step[index])
-    return States(collate([graphs[i] for i in index]), *rest)
-
-
-def test_routing_follows_the_order_of_the_steps():
-    graphs = [build_graph(tabletop(s), SMALL) for s in range(4)]
-    network, owner, one = RoutingNetwork(ROUTING), torch.zeros(3, dtype=torch.int64), torch.zeros(1).long()
-    shown, query = states(graphs[:3], [0, 1, 2]), states(graphs[3:], [1])
-    scores, present = network(shown, owner, query, one)
-    order = torch.tensor([2, 0, 1])
-    again, _ = network(chosen((graphs, shown), order), owner, query, one)
-    assert present.all()
-    torch.testing.assert_close(again, scores[:, order], atol=1e-5, rtol=1e-4)
-
-
-def test_routing_of_demonstrations_of_different_length():
-    graphs = [build_graph(tabletop(s), SMALL) for s in range(5)]
-    network = RoutingNetwork(ROUTING)
-    shown, query = states(graphs[:3], [0, 1, 0]), states(graphs[3:], [1, UNKNOWN])
-    owner, of = torch.tensor([0, 0, 1]), torch.tensor([0, 1])
-    scores, present = network(shown, owner, query, of)
-    assert present.tolist() == [[True, True], [True, False]]
-    alone, _ = network(
-        chosen((graphs, shown), [2]), owner[:1], chosen((graphs[3:], query), [1]), torch.tensor([0])
-    )
-    torch.testing.assert_close(scores[1, :1], alone[0], atol=1e-5, rtol=1e-4)
-    assert scores[1].softmax(0)[1] == 0
-
-
-def test_routing_does_not_notice_where_a_state_stands():
-    """A turn about the vertical and a move along the table change no input; floats allow 1e-3 of a score."""
-    T = se3.make(se3.euler(z=1.1), (0.2, -0.1, 0.0))
-    graphs = [build_graph(tabletop(s), SMALL) for s in range(3)]
-    network, owner, one = RoutingNetwork(ROUTING), torch.zeros(2, dtype=torch.int64), torch.zeros(1).long()
-    shown = states(graphs[:2], [0, 1])
-    scores, _ = network(shown, owner, states(graphs[2:], [1]), one)
-    again, _ = network(shown, owner, states([turned(graphs[2], T)], [1], T @ GOAL), one)
-    torch.testing.assert_close(again, scores, atol=1e-3, rtol=1e-3)
-
-
-def test_routing_sees_what_is_at_the_gripper():
-    graphs = [build_graph(tabletop(s), SMALL) for s in range(3)]
-    network, owner, one = RoutingNetwork(ROUTING), torch.zeros(2, dtype=torch.int64), torch.zeros(1).long()
-    shown = states(graphs[:2], [0, 1])
-    at = [states(graphs[2:], [UNKNOWN], T) for T in (GOAL, se3.make(p=(0.05, 0, 0)) @ GOAL)]
-    near, far = (network(shown, owner, query, one)[0] for query in at)
-    assert not torch.allclose(near, far, atol=1e-3)
 
 
 def test_every_parameter_of_the_region_network_learns():

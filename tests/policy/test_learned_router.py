@@ -1,5 +1,7 @@
 """The learned router's rule, with a stand-in for what the network says."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 import torch
@@ -9,8 +11,8 @@ from hypothesis import strategies as st
 from imop.geometry import se3
 from imop.networks.graph import GraphConfig
 from imop.networks.model import Model, ModelConfig
-from imop.policy.learned_router import LearnedRouter, Odds
-from tests.networks.test_networks import ROUTING
+from imop.policy.learned_router import LearnedRouter, Odds, prior
+from tests.networks.test_routing import ROUTING
 from tests.policy.scenes import BLUE, RED, above, at, box, moved, scene, transitions
 
 HOME = above(0, 0, 1)
@@ -52,11 +54,11 @@ def test_states_that_look_the_same_follow_each_other_and_the_last_stays():
 
 
 def test_a_slight_doubt_changes_nothing():
-    """The network has to be ten to one for the step before, and surer for any other."""
+    """The network has to be five to one for a step before, and surer for a later one."""
     router = Told()
     for step in range(LENGTH):
         doubtful = np.full(LENGTH, 1.0)
-        doubtful[step] = 0.15
+        doubtful[step] = 0.25
         assert router.go(doubtful) == (0, step)
 
 
@@ -109,6 +111,26 @@ STATES = [
 def test_the_network_is_asked_about_every_demonstrated_step(router):
     (scores,) = router.scores(STATES[0])
     assert scores.shape == (3,) and np.isfinite(scores).all()
+
+
+def test_it_knows_what_was_seen_before_the_last_action(router):
+    router.reset()
+    fresh = router.scores(STATES[1])[0]
+    found = [fresh]
+    for before in (STATES[0], STATES[3]):
+        router.reset()
+        router.route(before)
+        np.testing.assert_array_equal(router.scores(STATES[1])[0], fresh)
+        router.took(0, 0)
+        found.append(router.scores(STATES[1])[0])
+    router.reset()
+    assert all(np.abs(a - b).max() > 1e-4 for a, b in combinations(found, 2))
+
+
+def test_odds_of_steps():
+    odds = Odds(back=0.2, skip=0.01)
+    np.testing.assert_allclose(prior(odds, 1, 4), [0.2, 1, 0.01, 0.01])
+    np.testing.assert_allclose(prior(odds, 4, 4), [0.2, 0.2, 0.2, 1])
 
 
 def test_time_steps_are_not_read(router):

@@ -4,11 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
-from imop.errors import ImopError, InvalidInput, NoConfidentMatch
+from imop.errors import CorruptData, ImopError, InvalidInput, NoConfidentMatch
 from imop.geometry import se3
+from imop.networks.model import Model, ModelConfig, save_model
+from imop.policy.learned_router import LearnedRouter
 from imop.policy.one_shot import OneShotPolicy
 from imop.policy.registration import RegistrationMatcher
+from imop.policy.router import AdvancingRouter
 
 
 def with_depth(observation, depth):
@@ -117,3 +121,15 @@ def test_a_failed_call_does_not_use_up_a_step(policy, wanted):
     with pytest.raises(InvalidInput):
         policy.act(with_depth(wanted.keyframes[0].observation, np.nan))
     assert policy.act(wanted.keyframes[0].observation).match.step == 0
+
+
+def test_routing_needs_a_trained_network(tmp_path):
+    torch.manual_seed(0)
+    model = Model(ModelConfig())
+    save_model(model, tmp_path, {})
+    with pytest.raises(CorruptData, match="routing"):
+        OneShotPolicy.from_pretrained(tmp_path, routed=True)
+    assert isinstance(OneShotPolicy.from_pretrained(tmp_path).router, AdvancingRouter)
+    model.routing.standardized.batches += 1
+    save_model(model, tmp_path, {})
+    assert isinstance(OneShotPolicy.from_pretrained(tmp_path, routed=True).router, LearnedRouter)

@@ -8,7 +8,7 @@ from imop.networks.graph import POINT_FEATURES, GraphConfig
 from imop.networks.matching import MatchingConfig
 from imop.networks.model import PAPER, SMALL, ModelConfig, load_model
 from imop.networks.region import GRIPPER_FEATURES, RegionConfig
-from imop.networks.routing import HAND_FEATURES, RoutingConfig
+from imop.networks.routing import INPUTS, RoutingConfig
 from imop.training.ablation import Ablation
 from imop.training.config import TrainConfig
 from imop.training.loop import CHECKPOINT, train
@@ -25,7 +25,7 @@ TINY = ModelConfig(
     GraphConfig(max_points=40, grids=()),
     RegionConfig(backbone(POINT_FEATURES + GRIPPER_FEATURES), stages=1),
     MatchingConfig(backbone(), layers=2, max_region=20, heads=2),
-    RoutingConfig(backbone(POINT_FEATURES + HAND_FEATURES), width=16, layers=1, heads=2),
+    RoutingConfig(backbone(INPUTS), width=16, layers=1, heads=2),
 )
 
 # Switches that do not meet in one network share a training, so that the test takes seconds.

@@ -1,11 +1,13 @@
 """Which tasks of a suite are meant: by split, by name, or all."""
 
 from imop.errors import InvalidInput
+from imop.tasks import rlbench
 from imop.tasks.tabletop import BASE, CROSS_OBJECT, NOVEL, TABLETOP
 from imop.tasks.task import Task
 
 SPLITS: dict[str, dict[str, dict[str, type[Task]]]] = {
     "tabletop": {"base": BASE, "novel": NOVEL, "cross_object": CROSS_OBJECT, "all": TABLETOP},
+    "rlbench": {"base": rlbench.BASE, "novel": rlbench.NOVEL, "all": rlbench.RLBENCH},
 }
 """Suite -> split -> task by its full name."""
 

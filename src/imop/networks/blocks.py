@@ -45,6 +45,34 @@ class MLP(nn.Sequential):
         super().__init__(nn.Linear(inputs, hidden), nn.SiLU(), nn.Linear(hidden, outputs))
 
 
+class Standardized(nn.Module):
+    """Inputs (N, C) to mean 0 and variance 1 over all states of the training so far, cut off far outside.
+
+    Unlike batch norm it treats demonstrated states and queries, training and use, alike.
+    """
+
+    mean: Tensor
+    square: Tensor
+    batches: Tensor
+
+    def __init__(self, width: int):
+        super().__init__()
+        self.register_buffer("mean", torch.zeros(width))
+        self.register_buffer("square", torch.ones(width))
+        self.register_buffer("batches", torch.zeros(()))
+
+    def forward(self, x: Tensor) -> Tensor:
+        """The standardized inputs; in training they are taken note of first."""
+        if self.training:
+            with torch.no_grad():
+                self.batches += 1
+                share = 1 / self.batches.clamp(max=1000.0)
+                self.mean.lerp_(x.mean(dim=0), share)
+                self.square.lerp_(x.square().mean(dim=0), share)
+        spread = (self.square - self.mean.square()).clamp_min(0).sqrt() + 0.02
+        return ((x - self.mean) / spread).clamp(-4, 4)
+
+
 def exact(x: Tensor) -> torch.autocast:
     """A context without mixed precision: places and scores need more than eight bits."""
     return torch.autocast(x.device.type, enabled=False)

@@ -19,7 +19,7 @@ from imop.networks.graph import POINT_FEATURES, GraphConfig
 from imop.networks.matching import MatchingConfig, MatchingNetwork
 from imop.networks.pose import PoseConfig, pose_network
 from imop.networks.region import GRIPPER_FEATURES, RegionConfig, RegionNetwork
-from imop.networks.routing import HAND_FEATURES, RoutingConfig, RoutingNetwork
+from imop.networks.routing import INPUTS, RoutingConfig, RoutingNetwork
 
 VERSION = 1
 CARD = "card.json"
@@ -61,9 +61,9 @@ PAPER = ModelConfig(
         max_region=1000,
     ),
     RoutingConfig(
-        BackboneConfig(POINT_FEATURES + HAND_FEATURES, (128, 256, 512), (2, 2, 5), group_width=16),
+        BackboneConfig(INPUTS, (128, 256, 512), (2, 2, 5), group_width=16),
         width=512,
-        layers=4,
+        layers=7,
         heads=8,
     ),
     route_graph=GraphConfig(voxel=0.01, plane_voxel=0.04, max_points=2000, grids=(0.03, 0.08), neighbours=16),
@@ -120,6 +120,8 @@ BUNDLED = Path(__file__).parents[1] / "weights"
 def load_model(folder: Path = BUNDLED) -> Model:
     """Read what `save_model` wrote; nothing is unpickled.
 
+    A routing network of an earlier shape is left out: the model gets an untrained one of the present shape.
+
     Raises:
         CorruptData: if a file is missing, damaged, of another version, or does not fit the configuration.
     """
@@ -135,9 +137,14 @@ def load_model(folder: Path = BUNDLED) -> Model:
     if hashlib.sha256(weights).hexdigest() != card.get("sha256"):
         raise CorruptData(folder / WEIGHTS, "does not have the hash that the card names")
     try:
-        config = dacite.from_dict(ModelConfig, card["config"], dacite.Config(cast=[tuple], strict=True))
-        model = Model(config)
-        model.load_state_dict(load(weights))
+        parts, known = card["config"], load(weights)
+        if "routing.standardized.mean" not in known:
+            parts = {name: part for name, part in parts.items() if name not in ("routing", "route_graph")}
+        model = Model(dacite.from_dict(ModelConfig, parts, dacite.Config(cast=[tuple], strict=True)))
+        if "routing" not in parts:
+            fresh = {name: w for name, w in model.state_dict().items() if name.startswith("routing.")}
+            known = {name: w for name, w in known.items() if not name.startswith("routing.")} | fresh
+        model.load_state_dict(known)
     except (KeyError, dacite.DaciteError, SafetensorError, RuntimeError, TypeError) as error:
         raise CorruptData(folder, f"weights and configuration do not fit ({error})") from error
     return model.eval()

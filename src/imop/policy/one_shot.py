@@ -4,11 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
-from imop.errors import InvalidInput, NoConfidentMatch
+from imop.errors import CorruptData, InvalidInput, NoConfidentMatch
 from imop.geometry.perception import Perception
 from imop.networks.model import BUNDLED, load_model
 from imop.policy.hypotheses import confidence
 from imop.policy.learned import LearnedMatcher
+from imop.policy.learned_router import LearnedRouter
 from imop.policy.matcher import Matcher, PreparedStep, Scene, Transition
 from imop.policy.router import AdvancingRouter, Router
 from imop.types import Action, Demonstration, FloatArray, Match, Observation
@@ -43,7 +44,11 @@ class OneShotPolicy:
 
     @classmethod
     def from_pretrained(
-        cls, weights: Path = BUNDLED, perception: Perception | None = None, min_confidence: float = 0.0
+        cls,
+        weights: Path = BUNDLED,
+        perception: Perception | None = None,
+        min_confidence: float = 0.0,
+        routed: bool = False,
     ) -> "OneShotPolicy":
         """The learned policy.
 
@@ -51,12 +56,20 @@ class OneShotPolicy:
             weights: folder with weights and card, as `imop train` writes it; by default the bundled ones.
             perception: makes clouds of observations; by default the robot stays in them.
             min_confidence: below it `act` raises `NoConfidentMatch`.
+            routed: whether the routing network chooses the step, so that what failed is repeated; otherwise
+                steps follow each other.
 
         Raises:
-            CorruptData: if the weights are missing, damaged, or do not fit their card.
+            CorruptData: if the weights are missing, damaged, do not fit their card, or are not trained for
+                routing though it is wanted.
         """
-        matcher = LearnedMatcher(load_model(weights))
-        return cls(matcher, perception or Perception(), min_confidence=min_confidence)
+        model = load_model(weights)
+        if routed and not model.routing.trained:
+            raise CorruptData(
+                weights, "has no trained routing network", "merge one into it (docs/training.md)"
+            )
+        router = LearnedRouter(model) if routed else None
+        return cls(LearnedMatcher(model), perception or Perception(), router, min_confidence)
 
     def watch(self, demonstration: Demonstration) -> None:
         """Take in a demonstration; a further call adds another one.

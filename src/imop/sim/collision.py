@@ -42,7 +42,8 @@ class CollisionChecker:
         self._hand = self._model.body(f"{ROBOT}hand").id
         self._held = _HeldBodies(world, self._model)
         robot = _mask(self._model.nbody, world.robot_bodies)
-        held = self._held.members
+        self._ignored = _mask(self._model.nbody, world.unavoided)
+        held = self._held.members & ~self._ignored
         gripper = [self._model.body(ROBOT + n).id for n in ("hand", "left_finger", "right_finger")]
         self._gripper = _mask(self._model.nbody, gripper)
         self._keep_only_pairs_of(robot | held, others=not allow_collisions, robot=robot)
@@ -55,7 +56,7 @@ class CollisionChecker:
         """Collide moving bodies with all, or the robot with itself only, and never others with others."""
         m = self._model
         bodies = m.geom_bodyid
-        solid = (m.geom_contype != 0) | (m.geom_conaffinity != 0)
+        solid = ((m.geom_contype != 0) | (m.geom_conaffinity != 0)) & ~self._ignored[bodies]
         active = moving if others else robot
         m.geom_conaffinity[:] = solid & active[bodies]
         m.geom_contype[:] = solid & (active[bodies] | others)

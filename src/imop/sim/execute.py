@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from imop.errors import PlanFailed
 from imop.sim.gripper import PERIOD_STEPS, OnFrame, set_gripper
 from imop.sim.motion import Planner, Trajectory
 from imop.sim.world import World
@@ -35,7 +36,12 @@ class Execution:
 
 
 def execute(
-    world: World, action: Action, linear: bool = False, seed: int = 0, on_frame: OnFrame | None = None
+    world: World,
+    action: Action,
+    linear: bool = False,
+    seed: int = 0,
+    on_frame: OnFrame | None = None,
+    insist: bool = False,
 ) -> Execution:
     """Reach the action's gripper pose, then open or close.
 
@@ -45,12 +51,13 @@ def execute(
         linear: accept only a straight line of the tip.
         seed: of the motion planner.
         on_frame: called with the world every 0.05 simulated seconds of motion.
+        insist: see `plan_for`.
 
     Raises:
         PlanFailed: if no motion was found; the world has not changed then.
     """
     started, simulated = time.monotonic(), world.time
-    trajectory = Planner(world, seed=seed).plan(action.T_world_gripper, action.allow_collisions, linear)
+    trajectory = plan_for(world, action.T_world_gripper, action.allow_collisions, linear, seed, insist)
     move(world, trajectory, on_frame)
     error = float(np.abs(world.robot_q - trajectory.positions[-1]).max())
     set_gripper(world, action.gripper_open, on_frame)
@@ -61,6 +68,36 @@ def execute(
         joint_error=error,
         straight=trajectory.straight,
     )
+
+
+def plan_for(
+    world: World,
+    T_world_gripper: FloatArray,
+    allow_collisions: bool = False,
+    linear: bool = False,
+    seed: int = 0,
+    insist: bool = False,
+) -> Trajectory:
+    """As `Planner.plan`.
+
+    Args:
+        world: not changed.
+        T_world_gripper: (4, 4) goal of the tip.
+        allow_collisions: let the robot touch its surroundings.
+        linear: accept only a straight line of the tip.
+        seed: of the motion planner.
+        insist: where nothing is found, plan again with collisions allowed, as RLBench does.
+
+    Raises:
+        PlanFailed: if no motion was found.
+    """
+    planner = Planner(world, seed=seed)
+    try:
+        return planner.plan(T_world_gripper, allow_collisions, linear)
+    except PlanFailed:
+        if allow_collisions or not insist:
+            raise
+        return planner.plan(T_world_gripper, True, linear)
 
 
 def move(world: World, trajectory: Trajectory, on_frame: OnFrame | None = None) -> None:

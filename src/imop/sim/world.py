@@ -116,6 +116,7 @@ class World:
             instance (id of its uppermost body), the whole robot is one, and 0 is nothing.
         instance_names: instance id -> name.
         graspable: names of the bodies that the gripper may attach.
+        unavoided: numbers of the bodies that motion planning does not care about; none unless a task says so.
     """
 
     def __init__(self, spec: Any):
@@ -135,6 +136,7 @@ class World:
         self.instance_names[int(np.flatnonzero(robot)[0])] = ROBOT.rstrip("/")
         names = [self.model.equality(i).name for i in range(self.model.neq)]
         self.graspable = tuple(name.removeprefix(GRASP) for name in names if name.startswith(GRASP))
+        self.unavoided: frozenset[int] = frozenset()
         self.arm_qpos = np.array([self.model.joint(name).qposadr[0] for name in ARM_JOINTS])
         self.arm_dof = np.array([self.model.joint(name).dofadr[0] for name in ARM_JOINTS])
         self.arm_ctrl = np.array([self.model.actuator(name).id for name in ARM_JOINTS])

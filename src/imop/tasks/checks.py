@@ -58,10 +58,10 @@ def reachable(world: World, T_world_gripper: FloatArray, allow_collisions: bool)
 
 def _is_free(world: World, q: FloatArray) -> bool:
     world.set_robot(q, 1.0)
-    return not _touched(world)
+    return not touched(world)
 
 
-def _touched(world: World) -> set[str]:
+def touched(world: World) -> set[str]:
     """Names of the bodies that the robot touches."""
     bodies = world.model.geom_bodyid[world.data.contact.geom[: world.data.ncon]]
     robot = np.isin(bodies, list(world.robot_bodies))
@@ -87,7 +87,7 @@ def rehearse(world: World, waypoints: Sequence[Waypoint]) -> str:
             target = waypoint.target(world)
             plan = Planner(world).plan(target, waypoint.allow_collisions, waypoint.linear)
             world.set_robot(plan.positions[-1], 1.0)
-            if in_the_way := _touched(world) - {waypoint.frame}:
+            if in_the_way := touched(world) - {waypoint.frame}:
                 return f"the hand would hit {in_the_way}"
         return ""
     except PlanFailed as error:

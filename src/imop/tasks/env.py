@@ -14,13 +14,13 @@ from imop.sim.execute import execute
 from imop.sim.gripper import OnFrame
 from imop.sim.motion import WORKSPACE_LOWER, WORKSPACE_UPPER
 from imop.sim.world import World
+from imop.tasks.rlbench import RLBENCH
 from imop.tasks.tabletop import TABLETOP
-from imop.tasks.task import Task, make_scene
+from imop.tasks.task import Task, make_scene, watching
 from imop.types import Action, CameraView, FloatArray, Observation, as_array
 
 IMAGE = 128
-STEP_LIMIT = 25
-TASKS: dict[str, type[Task]] = {**TABLETOP}
+TASKS: dict[str, type[Task]] = {**TABLETOP, **RLBENCH}
 
 ObservationDict = dict[str, Any]
 
@@ -37,7 +37,7 @@ def make_task(name: str) -> Task:
 
 
 def make_env(
-    name: str, variation: int = 0, step_limit: int = STEP_LIMIT, on_frame: OnFrame | None = None
+    name: str, variation: int = 0, step_limit: int | None = None, on_frame: OnFrame | None = None
 ) -> "ImopEnv":
     """The environment of the task called "suite/name"; see `ImopEnv`.
 
@@ -125,17 +125,17 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
     Args:
         task: is built anew at every reset.
         variation: number of the aim, where `reset` is not told.
-        step_limit: the episode is truncated after so many steps.
+        step_limit: the episode is truncated after so many steps; the task's own limit if None.
         on_frame: called with the world every 0.05 simulated seconds.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 (Gymnasium's name and type)
 
     def __init__(
-        self, task: Task, variation: int = 0, step_limit: int = STEP_LIMIT, on_frame: OnFrame | None = None
+        self, task: Task, variation: int = 0, step_limit: int | None = None, on_frame: OnFrame | None = None
     ):
         self.task, self.variation, self.on_frame = task, variation, on_frame
-        self._step_limit = step_limit
+        self._step_limit = step_limit or task.step_limit
         self._world: World | None = None
         self._observation: Observation | None = None
         low = np.array([*WORKSPACE_LOWER, -1, -1, -1, -1, 0, 0], dtype=np.float64)
@@ -147,7 +147,7 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
                 "T_world_gripper": _real(4, 4),
                 "gripper_opening": spaces.Box(0, 1, (1,), np.float64),
                 "joint_positions": _real(7),
-                "time_step": spaces.Discrete(step_limit + 1),
+                "time_step": spaces.Discrete(self._step_limit + 1),
             }
         )
 
@@ -207,7 +207,8 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
         steps = self.observation.time_step + 1
         info: dict[str, Any] = {"success": False}
         try:
-            execute(self.world, to_action(action), on_frame=self.on_frame)
+            watch = watching(self.task, self.on_frame)
+            execute(self.world, to_action(action), on_frame=watch, insist=self.task.insist)
             info["success"] = self.task.success(self.world)
         except PlanFailed as error:
             info["plan_failed"] = error.reason

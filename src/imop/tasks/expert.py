@@ -4,13 +4,15 @@ from dataclasses import replace
 
 from imop.errors import ImopError, PlanFailed
 from imop.sim.cameras import observe
-from imop.sim.execute import move
-from imop.sim.gripper import OnFrame, set_gripper
-from imop.sim.motion import Planner
+from imop.sim.execute import move, plan_for
+from imop.sim.gripper import PERIOD_STEPS, OnFrame, set_gripper
 from imop.sim.world import World
-from imop.tasks.task import Task, make_scene
+from imop.tasks.task import Task, make_scene, watching
 from imop.tasks.waypoint import Waypoint
 from imop.types import Action, Demonstration, Keyframe
+
+_EXTRA_PERIODS = 10
+"""Waited for what still rolls or falls after the last step, as RLBench does."""
 
 
 class ExpertFailed(ImopError):
@@ -59,22 +61,28 @@ def perform(task: Task, world: World, on_frame: OnFrame | None = None) -> Demons
         ExpertFailed: if a motion was not found or the aim was not reached.
     """
     count = len(task.waypoints(world))
+    watch = watching(task, on_frame)
     keyframes = []
     for step in range(count):
         try:
-            keyframes.append(_follow(world, task.waypoints(world)[step], step, on_frame))
+            keyframes.append(_follow(world, task.waypoints(world)[step], step, watch, task.insist))
         except PlanFailed as error:
             raise ExpertFailed(task.name, step, error.reason) from error
+    for _ in range(_EXTRA_PERIODS):
+        if task.success(world):
+            break
+        world.step(PERIOD_STEPS)
+        watch(world)
     if not task.success(world):
         raise ExpertFailed(task.name, count, "all waypoints were reached, but not the aim")
     return Demonstration(tuple(keyframes), observe(world, time_step=count), task=task.name)
 
 
-def _follow(world: World, waypoint: Waypoint, step: int, on_frame: OnFrame | None) -> Keyframe:
+def _follow(world: World, waypoint: Waypoint, step: int, on_frame: OnFrame | None, insist: bool) -> Keyframe:
     observation = observe(world, time_step=step)
     T_world_object = world.pose(waypoint.frame)
     # Like a policy's actions: straight where possible. Scenes are chosen so that linear waypoints are.
-    plan = Planner(world).plan(waypoint.target(world), waypoint.allow_collisions)
+    plan = plan_for(world, waypoint.target(world), waypoint.allow_collisions, insist=insist)
     move(world, plan, on_frame)
     action = Action(world.T_world_gripper, waypoint.gripper_open, waypoint.allow_collisions)
     set_gripper(world, waypoint.gripper_open, on_frame)

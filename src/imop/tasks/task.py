@@ -7,13 +7,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from imop.errors import InvalidInput
+from imop.sim.gripper import OnFrame
 from imop.sim.world import World, allow_grasp, scene_spec
-from imop.tasks.checks import at_rest, overlaps, reachable, rehearse, settle
-from imop.tasks.clutter import add_clutter, clutter_items
-from imop.tasks.layout import ROBOT_FOOT, Item, NoRoom, scatter
 from imop.tasks.waypoint import Waypoint
-
-_ATTEMPTS = 150
 
 
 class Task(ABC):
@@ -22,11 +18,15 @@ class Task(ABC):
     Attributes:
         name: "suite/name".
         variations: how many aims there are (which drawer, which colour).
+        step_limit: how many actions an episode may take.
+        insist: whether a motion that would touch something is made all the same if there is no other.
         graspable: bodies that the gripper may attach.
     """
 
     name: ClassVar[str]
     variations: ClassVar[int] = 1
+    step_limit: ClassVar[int] = 25
+    insist: ClassVar[bool] = False
     graspable: tuple[str, ...] = ()
 
     @abstractmethod
@@ -37,58 +37,38 @@ class Task(ABC):
     def build(self, spec: Any, variation: int, rng: np.random.Generator) -> None:
         """Add the task's objects to `spec`; `rng` decides shapes, sizes and colours."""
 
-    @abstractmethod
-    def items(self) -> Sequence[Item]:
-        """What has to be placed on the table, the largest first."""
+    def furnish(self, spec: Any, rng: np.random.Generator) -> None:  # noqa: B027 (optional)
+        """Add what differs from scene to scene and the task does not need; nothing by default."""
 
-    def arrange(self, world: World, rng: np.random.Generator) -> None:  # noqa: B027 (optional)
-        """Complete the scene after the items were placed (a lid onto its pot); nothing by default."""
+    @abstractmethod
+    def reset(self, world: World, rng: np.random.Generator) -> None:
+        """Place everything at random so that the expert can begin.
+
+        Raises:
+            NoRoom: if no such scene was found in a bounded number of attempts.
+        """
 
     @abstractmethod
     def waypoints(self, world: World) -> Sequence[Waypoint]:
         """The expert's steps, always as many for a variation. Step k is read when steps before k are done."""
 
+    def watch(self, world: World) -> None:  # noqa: B027 (optional)
+        """See, every 0.05 simulated seconds, what the aim depends on later; nothing by default."""
+
     @abstractmethod
     def success(self, world: World) -> bool:
         """Whether the aim is reached now."""
 
-    def reset(self, world: World, rng: np.random.Generator) -> None:
-        """Place everything at random: nothing overlaps, all is at rest, the arm reaches every waypoint.
 
-        Raises:
-            NoRoom: if no such scene was found in a bounded number of attempts.
-        """
-        untouched = world.save_state()
-        problem = ""
-        for _ in range(_ATTEMPTS):
-            world.restore_state(untouched)
-            try:
-                self._place(world, rng)
-            except NoRoom as error:
-                problem = str(error)
-                continue
-            problem = self._problem(world)
-            if not problem:
-                return
-        raise NoRoom(f"{self.name}: no valid scene in {_ATTEMPTS} attempts; the last one: {problem}")
+def watching(task: Task, on_frame: OnFrame | None) -> OnFrame:
+    """What to call every 0.05 simulated seconds so that the task and somebody else can watch."""
 
-    def _place(self, world: World, rng: np.random.Generator) -> None:
-        taken = scatter(world, rng, self.items(), np.array([ROBOT_FOOT]))
-        self.arrange(world, rng)
-        scatter(world, rng, clutter_items(world), taken)
+    def watch(world: World) -> None:
+        task.watch(world)
+        if on_frame is not None:
+            on_frame(world)
 
-    def _problem(self, world: World) -> str:
-        """What is wrong with the scene, or an empty string; settles the scene."""
-        if touching := overlaps(world):
-            return f"{touching} overlap"
-        steps = self.waypoints(world)
-        if not all(reachable(world, w.target(world), w.allow_collisions) for w in steps):
-            return "a waypoint is out of reach"
-        before = {item.body: world.pose(item.body) for item in (*self.items(), *clutter_items(world))}
-        settle(world)
-        if not at_rest(world, before) or overlaps(world):
-            return "something moves by itself"
-        return rehearse(world, steps)
+    return watch
 
 
 def make_scene(task: Task, variation: int, instance_seed: int, seed: int) -> World:
@@ -108,7 +88,7 @@ def make_scene(task: Task, variation: int, instance_seed: int, seed: int) -> Wor
         raise InvalidInput("variation", f"{variation}", f"0 .. {task.variations - 1} for {task.name}")
     spec = scene_spec()
     task.build(spec, variation, np.random.default_rng((instance_seed, variation)))
-    add_clutter(spec, np.random.default_rng((seed, 1)))
+    task.furnish(spec, np.random.default_rng((seed, 1)))
     for body in task.graspable:
         allow_grasp(spec, body)
     world = World(spec)

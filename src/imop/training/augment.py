@@ -1,5 +1,6 @@
 """What a pair may look like without its truth changing."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,11 +29,11 @@ def augment(pair: StepPair, rng: np.random.Generator) -> StepPair:
     whole views are lost.
     """
     A, B = _motion(rng, pair.T_world_goal[:3, 3]), _motion(rng, pair.query.points.mean(axis=0))
-    light = _light(rng, 0.25)
+    light = random_light(rng, 0.25)
     support, region = _worse(pair.support, rng, pair.region)
     after, _ = _worse(pair.after, rng)
     query, _ = _worse(pair.query, rng)
-    light_query = light @ _light(rng, 0.06)
+    light_query = light @ random_light(rng, 0.06)
     return replace(
         pair,
         support=_moved(_lit(support, light), A),
@@ -52,7 +53,7 @@ def _motion(rng: np.random.Generator, center: FloatArray) -> FloatArray:
     return se3.make(R, center + shift - R @ center)
 
 
-def _light(rng: np.random.Generator, strength: float) -> FloatArray:
+def random_light(rng: np.random.Generator, strength: float) -> FloatArray:
     """(3, 3) random gain of each channel with a little mixing between them."""
     return np.diag(np.exp(rng.normal(0, strength, 3))) @ (np.eye(3) + rng.normal(0, 0.3 * strength, (3, 3)))
 
@@ -84,9 +85,10 @@ def _worse(
     return replace(thinner, points=noisy), inside[keep]
 
 
-def other_light(graph: Graph, rng: np.random.Generator, strength: float) -> Graph:
-    """The graph of the same cloud in other light; places stay, so that nothing has to be searched anew."""
-    light = torch.from_numpy(_light(rng, strength).astype(np.float32))
+def other_light(graph: Graph, lights: Sequence[FloatArray]) -> Graph:
+    """The same clouds in other light, one (3, 3) for each; places stay, nothing has to be searched anew."""
+    light = torch.from_numpy(np.stack(lights).astype(np.float32))[graph.cloud]
     features = graph.features.clone()
-    features[:, :3] = ((features[:, :3] + 0.5) @ light.T).clamp(0, 1) - 0.5
+    lit = ((features[:, None, :3] + 0.5) * light).sum(dim=2)
+    features[:, :3] = lit.clamp(0, 1) - 0.5
     return replace(graph, features=features)

@@ -6,6 +6,7 @@ python -m imop.training.chains --pairs DIR --out DIR
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +44,8 @@ def chained_routes(shard: Shard, rng: np.random.Generator) -> Iterator[Route]:
     """
     supports = shard.clouds
     after = {int(s): int(a) for s, a, _ in supports}
+    ahead = {now: state for state, now in after.items()}
+    seen = cache(partial(_seen, shard))
     queries: dict[int, list[int]] = defaultdict(list)
     first: dict[int, int] = {}
     for number, (support, _, query) in enumerate(supports):
@@ -60,11 +63,11 @@ def chained_routes(shard: Shard, rng: np.random.Generator) -> Iterator[Route]:
         for step, state in enumerate(chain):
             right = np.arange(len(chain)) == step
             for query in queries[state]:
-                if query in first:
-                    asked.append(Query(_seen(shard, first[query], widths[step]), step, right))
-        yield Route(
-            tuple(_seen(shard, first[s], w) for s, w in zip(chain, widths, strict=True)), tuple(asked)
-        )
+                before = ahead.get(query) if step else query
+                if query in first and before in first:
+                    now = seen(first[query], widths[step])
+                    asked.append(Query(now, seen(first[before], widths[max(step - 1, 0)]), step, right))
+        yield Route(tuple(seen(first[s], w) for s, w in zip(chain, widths, strict=True)), tuple(asked))
 
 
 def _seen(shard: Shard, number: int, opening: float) -> Seen:

@@ -63,21 +63,13 @@ class RouteDataset(Dataset[RouteSample]):
         config: how clouds become graphs.
         seed: of sources, routes, queries and augmentation.
         augmented: whether to augment at all; validation does not.
-        blind: whether queries that are not augmented do without what is expected.
 
     Raises:
         CorruptData: if a folder has no shard, or one cannot be read.
     """
 
-    def __init__(
-        self,
-        folders: Sequence[Path],
-        config: ModelConfig,
-        seed: int,
-        augmented: bool = True,
-        blind: bool = False,
-    ):
-        self._config, self._augmented, self._blind = config, augmented, blind
+    def __init__(self, folders: Sequence[Path], config: ModelConfig, seed: int, augmented: bool = True):
+        self._config, self._augmented = config, augmented
         self._source = _Source(folders, RouteShard, seed, augmented)
 
     def __len__(self) -> int:
@@ -85,8 +77,7 @@ class RouteDataset(Dataset[RouteSample]):
 
     def __getitem__(self, index: int) -> RouteSample:
         route, rng = self._source.pick(index)
-        drawn = rng if self._augmented else None
-        return make_route_sample(route, self._config.route_graph, drawn, self._blind)
+        return make_route_sample(route, self._config.route_graph, rng if self._augmented else None)
 
 
 @overload

@@ -41,31 +41,29 @@ def validate_routes(model: Model, folder: Path, count: int) -> dict[str, float]:
     """Means over the queries of the first `count` routes of a folder of shards, without augmentation.
 
     Returns:
-        routing: share of the queries for which the best step is a right one. routing_blind: likewise, without
-        being told which step is expected. routing_mishaps: of the queries in which another step than the
-        expected one is right.
+        routing: share of the queries for which the best step is a right one. routing_mishaps: of the queries
+        in which another step than the expected one is right. routing_ordinary: of the others.
     """
-    found: dict[str, list[float]] = {"routing": [], "routing_blind": [], "routing_mishaps": []}
+    found: dict[str, list[float]] = {"routing": [], "routing_ordinary": [], "routing_mishaps": []}
+    dataset = RouteDataset([folder], model.config, seed=0, augmented=False)
     training = model.training
     model.eval()
     with torch.no_grad():
-        for blind in (False, True):
-            dataset = RouteDataset([folder], model.config, seed=0, augmented=False, blind=blind)
-            for batch in loader(dataset, range(min(count, len(dataset))), _BATCH, workers=0):
-                scores, _ = model.routing(batch.shown, batch.demonstration, batch.query, batch.of)
-                right = batch.right.gather(1, scores.argmax(dim=1, keepdim=True))[:, 0]
-                found["routing_blind" if blind else "routing"] += right.float().tolist()
-                if not blind:
-                    found["routing_mishaps"] += right[_mishaps(batch)].float().tolist()
+        for batch in loader(dataset, range(min(count, len(dataset))), _BATCH, workers=0):
+            scores, _ = model.routing(batch.shown, batch.demonstration, batch.query, batch.of, batch.expected)
+            right = batch.right.gather(1, scores.argmax(dim=1, keepdim=True))[:, 0].float()
+            wrong = _mishaps(batch)
+            found["routing"] += right.tolist()
+            found["routing_ordinary"] += right[~wrong].tolist()
+            found["routing_mishaps"] += right[wrong].tolist()
     model.train(training)
     return {name: float(np.mean(values)) for name, values in found.items() if values}
 
 
 def _mishaps(batch: RouteBatch) -> Tensor:
     """(Q,) True where the expected step is not right."""
-    expected = batch.query.step.long()
-    past_the_end = expected >= batch.right.shape[1]
-    known = batch.right.gather(1, expected.clamp(0, batch.right.shape[1] - 1)[:, None])[:, 0]
+    past_the_end = batch.expected >= batch.right.shape[1]
+    known = batch.right.gather(1, batch.expected.clamp(0, batch.right.shape[1] - 1)[:, None])[:, 0]
     return past_the_end | ~known
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Literal
 
 import numpy as np
 
@@ -14,24 +15,39 @@ from imop.types import FloatArray
 
 _HIGH = TABLE_HEIGHT + 0.12
 
+Kind = Literal["missed", "dropped", "fallen", "partial", "slipped", "moved"]
+"""Nothing was grasped; it was lost on the way; it did not stay where it was put; a joint moved part of its
+way; the gripper left a joint's link; the gripper alone stands elsewhere."""
+
 
 @dataclass(frozen=True, eq=False)
 class Mishap:
     """A state of an episode that does not go as demonstrated.
 
     Attributes:
+        kind: what went wrong.
         state: where everything is.
+        before: number of the execution's state that shows the things as they were before the last action.
         expected: number of the step that would come next if all had gone well.
         right: number of the step with which the task can still be done.
     """
 
+    kind: Kind
     state: State
+    before: int
     expected: int
     right: int
 
 
-_Possible = tuple[Callable[[], State], int, int]
-"""How to make the state, the step that is expected in it, and the right one."""
+@dataclass(frozen=True)
+class _Possible:
+    """A mishap whose state is not made yet."""
+
+    kind: Kind
+    make: Callable[[], State]
+    before: int
+    expected: int
+    right: int
 
 
 def mishaps(scene: Scene, states: Sequence[State], rng: np.random.Generator, count: int) -> list[Mishap]:
@@ -39,10 +55,10 @@ def mishaps(scene: Scene, states: Sequence[State], rng: np.random.Generator, cou
     possible = [*_of_carrying(scene, states, rng), *_of_joints(scene, states, rng)]
     chosen = [possible[i] for i in rng.permutation(len(possible))]
     found: list[Mishap] = []
-    for make, expected, right in [_of_gripper(scene, states, rng), *chosen]:
+    for one in [_of_gripper(scene, states, rng), *chosen]:
         if len(found) < count:
             try:
-                found.append(Mishap(make(), expected, right))
+                found.append(Mishap(one.kind, one.make(), one.before, one.expected, one.right))
             except Unreachable:
                 continue
     return found
@@ -56,12 +72,13 @@ def _of_carrying(scene: Scene, states: Sequence[State], rng: np.random.Generator
             start = _start(scene, k)
             same_part = [j for j in range(k + 1, len(states)) if _start(scene, j - 1) == start]
             for j in same_part:
+                args = scene, states, k, j, rng
                 if states[j].held == step.thing:
-                    found.append((partial(_missed, scene, states, k, j, rng), j, start))
+                    found.append(_Possible("missed", partial(_missed, *args), k, j, start))
                     if j > k + 1:
-                        found.append((partial(_dropped, scene, states, k, j, rng), j, start))
+                        found.append(_Possible("dropped", partial(_dropped, *args), j - 1, j, start))
                 else:
-                    found.append((partial(_fallen, scene, states, k, j, rng), j, start))
+                    found.append(_Possible("fallen", partial(_fallen, *args), j - 1, j, start))
     return found
 
 
@@ -123,10 +140,15 @@ def _of_joints(scene: Scene, states: Sequence[State], rng: np.random.Generator) 
     for k, step in enumerate(scene.recipe.steps):
         if step.joint is not None:
             start = _start(scene, k)
-            found.append((partial(_partly, scene, states, k, rng), k + 1, k))
+            if states[k - 1].gripper_open and not states[k].gripper_open and k > start:
+                found.append(
+                    _Possible("missed", partial(_missed, scene, states, k - 1, k, rng), k - 1, k, start)
+                )
+            found.append(_Possible("partial", partial(_partly, scene, states, k, rng), k, k + 1, k))
             for j in range(k + 1, len(states)):
                 if _start(scene, j - 1) == start:
-                    found.append((partial(_slipped, scene, states, k, j, rng), j, start))
+                    make = partial(_slipped, scene, states, k, j, rng)
+                    found.append(_Possible("slipped", make, k, j, start))
     return found
 
 
@@ -165,7 +187,7 @@ def _of_gripper(scene: Scene, states: Sequence[State], rng: np.random.Generator)
     turn = se3.euler(*rng.normal(0, 0.05, 3))
     move = se3.make(p=rng.uniform(-far, far, 3) * (1, 1, 0.5))
     goal = move @ states[j].T_world_gripper @ se3.make(turn)
-    return partial(states[j].reached, goal), j, j
+    return _Possible("moved", partial(states[j].reached, goal), max(j - 1, 0), j, j)
 
 
 def _start(scene: Scene, step: int) -> int:

@@ -24,7 +24,8 @@ class Objective(nn.Module):
         """Losses by name."""
         parts = {} if pairs is None else self.pairs(pairs)
         if routes is not None and self.routing is not None:
-            scores, _ = self.routing(routes.shown, routes.demonstration, routes.query, routes.of)
+            asked = (routes.shown, routes.demonstration, routes.query, routes.of, routes.expected)
+            scores, _ = self.routing(*asked)
             parts["routing"] = losses.routing(scores, routes.right)
         return parts
 

@@ -9,15 +9,20 @@ import torch
 from torch import Tensor
 
 from imop.geometry.cloud import PointCloud
-from imop.networks.graph import Graph, GraphConfig, build_graph, collate
-from imop.networks.routing import UNKNOWN, States, make_states
-from imop.training.augment import other_light
+from imop.networks.changes import change_graph
+from imop.networks.graph import Graph, GraphConfig, collate
+from imop.networks.routing import States, make_states
+from imop.training.augment import other_light, random_light
 from imop.training.routes import Query, Route, Seen
 
 QUERIES = 8
 """How many queries of a route make a training sample."""
-IN_VAIN = 0.3
+HARD, HARD_ODDS = ("fallen", "slipped", "partial"), 4.0
+"""Mishaps that the opening of the gripper does not tell are asked about more often in training."""
+IN_VAIN = 0.15
 """How many training queries are made of two states."""
+CUT = 0.5
+"""How many routes are cut in training."""
 LIGHT, LIGHT_NOISE = 0.25, 0.05
 OPEN, EMPTY = 0.9, 0.03
 POSITION_NOISE, OPENING_NOISE = 0.002, 0.01
@@ -30,11 +35,13 @@ class RouteSample:
     Attributes:
         shown: the demonstrated states.
         query: some queries.
+        expected: (Q,) int64 number of the step that is expected next in each.
         right: (Q, L) True for the steps that are right.
     """
 
     shown: States
     query: States
+    expected: Tensor
     right: Tensor
 
 
@@ -47,6 +54,7 @@ class RouteBatch:
         demonstration: (S,) number of the sample of each.
         query: all queries.
         of: (Q,) number of the sample of each.
+        expected: (Q,) int64 number of the step that is expected next in each.
         right: (Q, L) True for right steps; as wide as the longest demonstration.
     """
 
@@ -54,16 +62,18 @@ class RouteBatch:
     demonstration: Tensor
     query: States
     of: Tensor
+    expected: Tensor
     right: Tensor
 
     def to(self, device: torch.device | str) -> "RouteBatch":
         """The same batch on a device."""
-        numbers = (self.demonstration.to(device), self.of.to(device), self.right.to(device))
-        return RouteBatch(self.shown.to(device), numbers[0], self.query.to(device), *numbers[1:])
+        shown, query = self.shown.to(device), self.query.to(device)
+        rest = (t.to(device) for t in (self.of, self.expected, self.right))
+        return RouteBatch(shown, self.demonstration.to(device), query, *rest)
 
 
 def make_route_sample(
-    route: Route, config: GraphConfig, rng: np.random.Generator | None = None, blind: bool = False
+    route: Route, config: GraphConfig, rng: np.random.Generator | None = None
 ) -> RouteSample:
     """Tensors of a route.
 
@@ -72,39 +82,57 @@ def make_route_sample(
         config: how clouds become graphs.
         rng: for training: draws queries, augments them, and makes what is expected less reliable. Without it
             all queries are kept as they are.
-        blind: whether what is expected is unknown.
     """
+    route = route if rng is None or rng.random() > CUT else cut(route, rng)
     queries = list(route.queries)
-    expected = [UNKNOWN if blind else float(query.expected) for query in queries]
+    expected = [query.expected for query in queries]
     light = 0
     if rng is not None:
         light = int(rng.integers(2**32))
-        queries = [queries[i] for i in rng.permutation(len(queries))[:QUERIES]]
+        odds = np.array([HARD_ODDS if query.kind in HARD else 1.0 for query in queries])
+        count = min(QUERIES, len(queries))
+        drawn = rng.choice(len(queries), count, replace=False, p=odds / odds.sum())
+        queries = [queries[i] for i in drawn]
         queries = [in_vain(route, rng) or q if rng.random() < IN_VAIN else q for q in queries]
-        expected = [_expected(query, rng) for query in queries]
+        expected = [_expected(query, len(route.states), rng) for query in queries]
+    shown = list(zip(route.states, (route.states[0], *route.states), strict=False))
     return RouteSample(
-        _states(route.states, list(range(len(route.states))), config, light, rng),
-        _states([query.seen for query in queries], expected, config, light, rng),
+        _states(shown, config, light, rng),
+        _states([(query.seen, query.before) for query in queries], config, light, rng),
+        torch.tensor(expected),
         torch.from_numpy(np.stack([query.right for query in queries])),
     )
 
 
 def _states(
-    seen: Sequence[Seen],
-    steps: Sequence[float],
-    config: GraphConfig,
-    light: int,
-    rng: np.random.Generator | None,
+    seen: Sequence[tuple[Seen, Seen]], config: GraphConfig, light: int, rng: np.random.Generator | None
 ) -> States:
-    """States as tensors; with `rng` in other light (of the number `light`) and with other readings."""
-    graphs = [graph_of(s.cloud, config) for s in seen]
-    poses, opening = np.stack([s.T_world_gripper for s in seen]), np.array([s.opening for s in seen])
+    """States, each with the one before it, as tensors; with `rng` in other light and with other readings."""
+    looks = [changes_of(now.cloud, before.cloud, config) for now, before in seen]
+    poses = np.array([[now.T_world_gripper, before.T_world_gripper] for now, before in seen])
+    opening = np.array([[now.opening, before.opening] for now, before in seen])
     if rng is not None:
-        graphs = [other_light(g, np.random.default_rng(light), LIGHT) for g in graphs]
-        graphs = [other_light(g, rng, LIGHT_NOISE) for g in graphs]
-        poses[:, :3, 3] += rng.normal(0, POSITION_NOISE, (len(seen), 3))
-        opening = np.clip(opening + rng.normal(0, OPENING_NOISE, len(seen)), 0.0, 1.0)
-    return make_states(graphs, poses, opening.tolist(), steps)
+        poses[..., :3, 3] += rng.normal(0, POSITION_NOISE, (len(seen), 2, 3))
+        opening = np.clip(opening + rng.normal(0, OPENING_NOISE, opening.shape), 0.0, 1.0)
+    states = make_states(looks, poses, opening)
+    if rng is None:
+        return states
+    shared = random_light(np.random.default_rng(light), LIGHT)
+    lights = [shared @ random_light(rng, LIGHT_NOISE) for _ in seen]
+    return replace(states, graph=other_light(states.graph, lights))
+
+
+def cut(route: Route, rng: np.random.Generator) -> Route:
+    """The route without some steps at its ends, with the queries to which a step that is left is right."""
+    steps = len(route.states)
+    end = int(rng.integers(2, steps + 1)) if rng.random() < 0.7 else steps
+    begin = int(rng.integers(0, end - 1)) if rng.random() < 0.5 else 0
+    queries = tuple(
+        replace(query, expected=query.expected - begin, right=query.right[begin:end])
+        for query in route.queries
+        if begin <= query.expected <= end and query.right[begin:end].any() and not query.right[:begin].any()
+    )
+    return Route(route.states[begin:end], queries) if queries else route
 
 
 def in_vain(route: Route, rng: np.random.Generator) -> Query | None:
@@ -135,23 +163,22 @@ def in_vain(route: Route, rng: np.random.Generator) -> Query | None:
     before, later = scenes[int(rng.integers(len(scenes)))], grippers[int(rng.integers(len(grippers)))]
     opening = later.seen.opening if later.seen.opening > OPEN else 0.0
     state = replace(before.seen, T_world_gripper=later.seen.T_world_gripper, opening=opening)
-    return Query(state, j, np.arange(len(opened)) == k - 1)
+    still = scenes[int(rng.integers(len(scenes)))].seen
+    still = replace(still, T_world_gripper=later.before.T_world_gripper, opening=0.0)
+    return Query(state, still, j, np.arange(len(opened)) == k - 1, "missed")
 
 
 @lru_cache(maxsize=50_000)
-def graph_of(cloud: PointCloud, config: GraphConfig) -> Graph:
-    """The graph of a cloud; searching takes longer than learning, so the last ones are kept."""
-    return build_graph(cloud, config)
+def changes_of(now: PointCloud, before: PointCloud, config: GraphConfig) -> tuple[Graph, Tensor]:
+    """As `change_graph`; searching takes longer than learning, so the last ones are kept."""
+    return change_graph(now, before, config)
 
 
-def _expected(query: Query, rng: np.random.Generator) -> float:
-    """What is expected in a training query: often nothing, sometimes one step too many or anything near."""
+def _expected(query: Query, steps: int, rng: np.random.Generator) -> int:
+    """What is expected in a training query: sometimes one step too many or anything near."""
     kind = rng.random()
-    if kind < 0.5:
-        return UNKNOWN
-    if kind < 0.85:
-        return float(query.expected)
-    return float(max(0, query.expected + (1 if kind < 0.95 else int(rng.integers(-2, 3)))))
+    off = 0 if kind > 0.08 else 1 if kind > 0.04 else int(rng.integers(-2, 3))
+    return int(np.clip(query.expected + off, 0, steps))
 
 
 def collate_routes(samples: Sequence[RouteSample]) -> RouteBatch:
@@ -163,6 +190,7 @@ def collate_routes(samples: Sequence[RouteSample]) -> RouteBatch:
         _owner([sample.right.shape[1] for sample in samples]),
         _side_by_side([sample.query for sample in samples]),
         _owner([len(sample.right) for sample in samples]),
+        torch.cat([sample.expected for sample in samples]),
         torch.cat(right),
     )
 
@@ -170,9 +198,9 @@ def collate_routes(samples: Sequence[RouteSample]) -> RouteBatch:
 def _side_by_side(states: Sequence[States]) -> States:
     return States(
         collate([s.graph for s in states]),
+        torch.cat([s.change for s in states]),
         torch.cat([s.T_world_gripper for s in states]),
         torch.cat([s.opening for s in states]),
-        torch.cat([s.step for s in states]),
     )
 
 

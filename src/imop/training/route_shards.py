@@ -1,6 +1,6 @@
 """Routes in files, like pairs: a cloud is stored once, whether it is demonstrated, asked about, or both."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from imop.training.routes import Query, Route, Seen
 from imop.training.shards import cloud_arrays, read_arrays, read_cloud, starts, write_arrays
 
-VERSION = 1
+VERSION = 2
 
 
 def write_routes(routes: Sequence[Route], path: Path) -> None:
     """Write routes as one compressed .npz file, whole or not at all."""
-    every = {id(s): s for r in routes for s in (*r.states, *(query.seen for query in r.queries))}
+    every = {id(s): s for r in routes for s in _every(r)}
     number = {key: i for i, key in enumerate(every)}
     queries = [query for route in routes for query in route.queries]
     arrays: dict[str, NDArray[Any]] = {
@@ -26,12 +26,21 @@ def write_routes(routes: Sequence[Route], path: Path) -> None:
         "states": np.array([number[id(seen)] for route in routes for seen in route.states]),
         "state_start": starts([len(route.states) for route in routes]),
         "queries": np.array([number[id(query.seen)] for query in queries]),
+        "before": np.array([number[id(query.before)] for query in queries]),
+        "kind": np.array([query.kind for query in queries]),
         "query_start": starts([len(route.queries) for route in routes]),
         "expected": np.array([query.expected for query in queries]),
         "right": np.concatenate([query.right for query in queries]),
         "right_start": starts([len(query.right) for query in queries]),
     }
     write_arrays(arrays, path)
+
+
+def _every(route: Route) -> Iterator[Seen]:
+    yield from route.states
+    for query in route.queries:
+        yield query.seen
+        yield query.before
 
 
 class RouteShard:
@@ -57,7 +66,8 @@ class RouteShard:
     def _query(self, number: int) -> Query:
         a = self._arrays
         right = a["right"][slice(*a["right_start"][number : number + 2])]
-        return Query(self._seen(int(a["queries"][number])), int(a["expected"][number]), right)
+        seen, before = (self._seen(int(a[name][number])) for name in ("queries", "before"))
+        return Query(seen, before, int(a["expected"][number]), right, str(a["kind"][number]))
 
     def _seen(self, number: int) -> Seen:
         """Always the same object for the same number, so that what is made of it can be kept."""

@@ -8,7 +8,7 @@ import numpy as np
 from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud
-from imop.networks.graph import GraphConfig
+from imop.networks.changes import COMPARED
 from imop.training.depth_noise import DepthNoise
 from imop.training.families.thing import Family
 from imop.training.mishaps import Mishap, mishaps
@@ -17,8 +17,6 @@ from imop.training.stage import State, Unreachable
 from imop.training.synthetic import Poses
 from imop.types import BoolArray, FloatArray, as_array, as_pose
 
-STORED = GraphConfig(voxel=0.014, plane_voxel=0.06, max_points=450)
-"""Clouds for routing are coarser than those for matching."""
 IMAGE = 64
 PARTS_ODDS = (0.35, 0.4, 0.25)
 MISHAPS = 4
@@ -51,14 +49,18 @@ class Query:
 
     Attributes:
         seen: the state.
+        before: what was seen before the last action; the state itself at the beginning.
         expected: number of the step that comes next if every action so far did what was demonstrated; the
             number of steps if all are done.
         right: (L,) True for the steps that are right: more than one where demonstrated states are the same.
+        kind: the mishap that led to the state (`mishaps.Kind`); "ordinary" if all went as demonstrated.
     """
 
     seen: Seen
+    before: Seen
     expected: int
     right: BoolArray
+    kind: str = "ordinary"
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +113,7 @@ def _execute(scene: Scene, rng: np.random.Generator) -> _Execution:
     noise = DepthNoise.sample(rng)
 
     def look(state: State) -> Seen:
-        cloud = scene.stage.cloud(state, noise, rng, STORED, IMAGE)
+        cloud = scene.stage.cloud(state, noise, rng, COMPARED, IMAGE)
         return Seen(cloud, state.T_world_gripper, state.opening)
 
     wrong = mishaps(scene, states, rng, MISHAPS)
@@ -125,9 +127,23 @@ def _execute(scene: Scene, rng: np.random.Generator) -> _Execution:
 
 def _route(shown: _Execution, tried: _Execution) -> Route:
     same = indistinguishable(shown.states, shown.poses)
-    queries = [Query(seen, j, same[j]) for j, seen in enumerate(tried.seen)]
-    queries += [Query(seen, mishap.expected, same[mishap.right]) for seen, mishap in tried.asked]
+    queries = [Query(seen, tried.seen[max(j - 1, 0)], j, same[j]) for j, seen in enumerate(tried.seen)]
+    queries += [
+        Query(seen, _before(tried, seen, wrong), wrong.expected, same[wrong.right], wrong.kind)
+        for seen, wrong in tried.asked
+    ]
     return Route(shown.seen, tuple(queries))
+
+
+def _before(tried: _Execution, seen: Seen, wrong: Mishap) -> Seen:
+    """What was seen before the last action: things as they were then, the gripper a step before."""
+    last = wrong.expected - 1
+    if last < 0:
+        return seen
+    things, gripper = tried.seen[wrong.before], tried.seen[last]
+    # What went wrong earlier left the hand empty since.
+    opening = 0.0 if last > wrong.before and not tried.states[last].gripper_open else gripper.opening
+    return Seen(things.cloud, gripper.T_world_gripper, opening)
 
 
 def indistinguishable(states: list[State], poses: list[Poses]) -> BoolArray:

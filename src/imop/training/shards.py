@@ -103,10 +103,10 @@ def read_arrays(path: Path, version: int, wanted: str) -> dict[str, NDArray[Any]
         found = int(arrays["version"])
     except Exception as error:
         raise CorruptData(path, f"is not a shard of training data ({error})", "generate it again") from error
-    if found != version:
-        raise CorruptData(path, f"has version {found}, not {version}", "generate it again")
     if wanted not in arrays:
         raise CorruptData(path, f"has no {wanted}: it is a shard of another kind")
+    if found != version:
+        raise CorruptData(path, f"has version {found}, not {version}", "generate it again")
     return arrays
 
 

@@ -36,13 +36,15 @@ def section(*items):
     return b"".join(items) + b"EOO"
 
 
-def common(name, handle, parent=-1, p=(0, 0, 0), q=(1, 0, 0, 0), extension="", layer=1, more=()):
+def common(
+    name, handle, parent=-1, p=(0, 0, 0), q=(1, 0, 0, 0), extension="", layer=1, properties=4, more=()
+):
     parts = [
         item("3do", b"\0\0\0"),
         item("Cfq", floats(*q, *p)),
         item("Ids", ints(handle, parent)),
         item("Nme", text(name)),
-        item("Op2", ints(4)),
+        item("Op2", ints(properties)),
         item("Lar", struct.pack("<H", layer)),
         item("Rst", text(extension)),
         *more,
@@ -73,7 +75,7 @@ def joint(
     return item("JNT", common(name, handle, parent, **where) + own)
 
 
-def sensor(name, handle, parent, kind=0, sizes=(0, 0.1, 0.04, 0.02, 0.04, 0.02, 0.01, 0.01, 0), **where):
+def sensor(name, handle, parent, kind=0, sizes=(0, 0.08, 0.04, 0.02, 0.04, 0.02, 0.01, 0.01, 0), **where):
     volume = section(item("Snt", ints(kind)), item("Ss3", floats(*sizes)))
     own = section(item("Snt", ints(30)), item("Vod", volume), item("Pr4", bytes([0])))
     return item("SNR", common(name, handle, parent, **where) + own)

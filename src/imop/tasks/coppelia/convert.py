@@ -22,6 +22,8 @@ from imop.types import FloatArray
 
 SETTLING = 0.1
 """Seconds in which a joint without motor loses most of its speed; CoppeliaSim's solvers damp as well."""
+LEAST_TURNED, LEAST_PUSHED = 1e-4, 0.01
+"""kg m2 and kg that every hinge and slide feels: caps and cranks of some grams would whirl."""
 _STIFF_FRICTION = (0.995, 0.999, 0.001, 0.5, 2)
 """Friction of MuJoCo's default softness lets heavy things creep."""
 _SITE_GROUP = 4
@@ -90,13 +92,14 @@ def _add_joint(body: Any, joint: Joint, prefix: str, inertia: float) -> None:
     A motor that is told to stand still is friction of its greatest force.
     """
     spring, turns = joint.motor == "spring", joint.kind == "revolute"
+    least = LEAST_TURNED if turns else LEAST_PUSHED if joint.kind == "prismatic" else 0.0
     # A spec is written in degrees.
     scale = np.degrees(1.0) if turns else 1.0
     options: dict[str, Any] = {
         "name": prefix + joint.name,
         "axis": [0, 0, 1],
-        "armature": 0.05 * inertia,
-        "damping": joint.damping if spring else inertia / SETTLING,
+        "armature": max(0.05 * inertia, least),
+        "damping": max(joint.damping if spring else 0.0, inertia / SETTLING, least / SETTLING),
         "solimp_friction": _STIFF_FRICTION,
     }
     if joint.kind == "spherical":

@@ -1,12 +1,13 @@
 """Pieces of shapes as MuJoCo geometry: what is seen, and what others bump into."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from imop.geometry import se3
 from imop.tasks.coppelia.model import Model, Piece, Shape
 from imop.types import FloatArray
 
@@ -38,6 +39,7 @@ class Assets:
     prefix: str
     meshes: dict[tuple[int, int, int, bool], str] = field(default_factory=dict)
     materials: dict[int, str] = field(default_factory=dict)
+    joined: dict[Any, Piece] = field(default_factory=dict)
 
     def mesh(self, piece: Piece, hull: bool) -> str | None:
         """Name of the piece's mesh, None if it has no surface; with `hull` only its convex hull counts."""
@@ -111,23 +113,60 @@ def _thickened(vertices: Any) -> FloatArray:
 
 def add_geoms(assets: Assets, body: Any, shape: Shape) -> None:
     """Give `body`, whose frame is the shape's, everything of the shape that is seen or solid."""
+    name = f"{assets.prefix}{shape.name}"
+    meshes: list[Piece] = []
     for k, piece in enumerate(shape.pieces):
-        name = f"{assets.prefix}{shape.name}" + (f":{k}" if k else "")
         drawn = is_drawn(shape, piece)
         primitive = _primitive(piece, solid=shape.respondable)
         if drawn and piece.uv is None and primitive is not None:
-            _add(body, piece, primitive, name, shape, drawn=True, solid=shape.respondable)
+            _add(body, piece, primitive, f"{name}:{k}", shape, drawn=True, solid=shape.respondable)
             continue
-        mesh = assets.mesh(piece, hull=False) if drawn else None
+        if drawn:
+            meshes.append(piece)
+        if shape.respondable:
+            solid = primitive or _hull(assets, piece)
+            if solid is not None:
+                _add(body, piece, solid, f"{name}:{k}:solid", shape, drawn=False, solid=True)
+    for k, piece in enumerate(_joined(assets, meshes)):
+        mesh = assets.mesh(piece, hull=False)
         if mesh is not None:
             options = {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": mesh}
             if piece.texture is not None:
                 options["material"] = assets.material(piece.texture)
-            _add(body, piece, options, name, shape, drawn=True, solid=False)
-        if shape.respondable:
-            solid = primitive or _hull(assets, piece)
-            if solid is not None:
-                _add(body, piece, solid, f"{name}:solid", shape, drawn=False, solid=True)
+            _add(body, piece, options, f"{name}:mesh{k}", shape, drawn=True, solid=False)
+
+
+def _joined(assets: Assets, pieces: list[Piece]) -> list[Piece]:
+    """The pieces, those of one colour and picture joined; rays take time for every geometry.
+
+    Compounds of the same arrays, as of equal mugs, are joined once.
+    """
+    alike: dict[Any, list[Piece]] = {}
+    for piece in pieces:
+        alike.setdefault((piece.color, piece.texture), []).append(piece)
+    found = []
+    for group in alike.values():
+        key = tuple((id(p.vertices), id(p.triangles), id(p.uv), p.T_shape_mesh.tobytes()) for p in group)
+        if len(group) > 1 and key not in assets.joined:
+            assets.joined[key] = _join(group)
+        found.append(assets.joined[key] if len(group) > 1 else group[0])
+    return found
+
+
+def _join(pieces: list[Piece]) -> Piece:
+    """One piece, in the shape's frame."""
+    points = [se3.apply(p.T_shape_mesh, p.vertices.astype(np.float64)) for p in pieces]
+    first = np.cumsum([0, *(len(p) for p in points[:-1])])
+    uv = [p.uv for p in pieces if p.uv is not None]
+    return replace(
+        pieces[0],
+        T_shape_mesh=np.eye(4),
+        vertices=np.concatenate(points).astype(np.float32),
+        triangles=np.concatenate([p.triangles + n for p, n in zip(pieces, first, strict=True)]).astype(
+            np.int32
+        ),
+        uv=np.concatenate(uv) if uv else None,
+    )
 
 
 def _hull(assets: Assets, piece: Piece) -> dict[str, Any] | None:

@@ -11,7 +11,7 @@ from imop.geometry import se3
 from imop.tasks.coppelia.model import Shape
 from imop.types import FloatArray
 
-LIGHTEST, HEAVIEST = 100.0, 8000.0
+LIGHTEST, HEAVIEST = 20.0, 8000.0
 """Densities of the bounding box, kg/m3."""
 LEAST_MASS = 0.002
 SLIMMEST, WIDEST = 0.5, 4.0

@@ -14,7 +14,7 @@ from imop.sim.world import World
 from imop.tasks.colors import NAMED, random_color
 from imop.tasks.grasps import backed_off, from_above, shifted
 from imop.tasks.layout import Area, Item
-from imop.tasks.task import Task
+from imop.tasks.tabletop.table_task import TableTask
 from imop.tasks.waypoint import Waypoint
 
 COLORS = ("red", "blue", "yellow", "purple", "teal")
@@ -25,7 +25,7 @@ _DEPTH = 0.02
 _ROOM = 0.09
 
 
-class BookInShelf(Task):
+class BookInShelf(TableTask):
     """Grasp the book of the variation's colour and lower it into the gap; another book distracts."""
 
     name = "tabletop/book_in_shelf"

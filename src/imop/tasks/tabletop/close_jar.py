@@ -14,7 +14,7 @@ from imop.sim.world import World
 from imop.tasks.colors import NAMED, random_color
 from imop.tasks.grasps import backed_off, from_above, shifted
 from imop.tasks.layout import Item
-from imop.tasks.task import Task
+from imop.tasks.tabletop.table_task import TableTask
 from imop.tasks.waypoint import Waypoint
 
 COLORS = tuple(NAMED)
@@ -23,7 +23,7 @@ _SLACK = 0.0003
 _TIGHT = np.radians(60.0)
 
 
-class CloseJar(Task):
+class CloseJar(TableTask):
     """Take the lid by its rim, set it on and turn it a quarter. Done when it is down, turned and released."""
 
     name = "tabletop/close_jar"

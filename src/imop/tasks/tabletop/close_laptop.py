@@ -13,7 +13,7 @@ from imop.sim.world import World
 from imop.tasks.colors import random_color
 from imop.tasks.grasps import from_above
 from imop.tasks.layout import Area, Item
-from imop.tasks.task import Task
+from imop.tasks.tabletop.table_task import TableTask
 from imop.tasks.waypoint import Waypoint
 from imop.types import FloatArray
 
@@ -27,7 +27,7 @@ _LEAN = np.radians(107.0)
 """Angle of the screen at which the fingers first point straight down."""
 
 
-class CloseLaptop(Task):
+class CloseLaptop(TableTask):
     """Push the screen from behind with closed fingers, forwards and down, until it lies on the keys."""
 
     name = "tabletop/close_laptop"

@@ -14,7 +14,7 @@ from imop.sim.world import World
 from imop.tasks.colors import NAMED, random_color
 from imop.tasks.grasps import backed_off, from_above, shifted
 from imop.tasks.layout import Item
-from imop.tasks.task import Task
+from imop.tasks.tabletop.table_task import TableTask
 from imop.tasks.waypoint import Waypoint
 from imop.types import FloatArray
 
@@ -25,7 +25,7 @@ _OUT = 0.085
 """How far outwards on the rod's line the cup waits before the handle goes over it."""
 
 
-class CupOnHook(Task):
+class CupOnHook(TableTask):
     """Take the cup by the rim opposite its handle, and bring the handle over the rod from its end."""
 
     name = "tabletop/cup_on_hook"

@@ -14,7 +14,7 @@ from imop.sim.world import World
 from imop.tasks.colors import random_color
 from imop.tasks.grasps import backed_off, from_above, shifted
 from imop.tasks.layout import Area, Item
-from imop.tasks.task import Task
+from imop.tasks.tabletop.table_task import TableTask
 from imop.tasks.waypoint import Waypoint
 from imop.types import FloatArray
 
@@ -34,7 +34,7 @@ def _level(x: float) -> FloatArray:
     return se3.make(R, (x, 0.0, _ABOVE_FLOOR))
 
 
-class GroceryInCupboard(Task):
+class GroceryInCupboard(TableTask):
     """Pick the variation's grocery from above by its top, and lay it into the cupboard, bottom first.
 
     Frames and grasps are the same for all groceries, so what was shown with one can be tried with another.

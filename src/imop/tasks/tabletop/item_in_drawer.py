@@ -15,7 +15,7 @@ from imop.tasks.checks import rehearse
 from imop.tasks.colors import random_color
 from imop.tasks.grasps import backed_off, from_above, from_front, shifted
 from imop.tasks.layout import Area, Item
-from imop.tasks.task import Task
+from imop.tasks.tabletop.table_task import TableTask
 from imop.tasks.waypoint import Waypoint
 from imop.types import FloatArray
 
@@ -30,7 +30,7 @@ _ROOM = 0.065
 """Around the item, for the fingers."""
 
 
-class ItemInDrawer(Task):
+class ItemInDrawer(TableTask):
     """Pull the variation's drawer open, take the item from the table and drop it into the drawer."""
 
     name = "tabletop/item_in_drawer"

@@ -13,13 +13,13 @@ from imop.sim.world import World
 from imop.tasks.colors import random_color
 from imop.tasks.grasps import backed_off, from_above, shifted
 from imop.tasks.layout import Item
-from imop.tasks.task import Task
+from imop.tasks.tabletop.table_task import TableTask
 from imop.tasks.waypoint import Waypoint
 
 _LIFT = 0.15
 
 
-class LidOffPot(Task):
+class LidOffPot(TableTask):
     """Grasp the knob from above and lift. Done when the lid is held 8 cm above its place on the pot."""
 
     name = "tabletop/lid_off_pot"

@@ -12,7 +12,7 @@ from imop.sim.world import World
 from imop.tasks.colors import random_color
 from imop.tasks.grasps import backed_off, from_front
 from imop.tasks.layout import Area, Item
-from imop.tasks.task import Task
+from imop.tasks.tabletop.table_task import TableTask
 from imop.tasks.waypoint import Waypoint
 
 _PITCH = np.radians(20.0)
@@ -20,7 +20,7 @@ _ARC = np.radians((20.0, 40.0, 60.0, 80.0, 98.0))
 _OPEN = np.radians(85.0)
 
 
-class OpenBox(Task):
+class OpenBox(TableTask):
     """Grasp the tab at the lid's edge and swing the lid up along an arc, until it leans back."""
 
     name = "tabletop/open_box"

@@ -12,7 +12,7 @@ from imop.sim.world import World
 from imop.tasks.colors import random_color
 from imop.tasks.grasps import backed_off, from_front, shifted
 from imop.tasks.layout import Area, Item
-from imop.tasks.task import Task
+from imop.tasks.tabletop.table_task import TableTask
 from imop.tasks.waypoint import Waypoint
 
 LEVELS = ("bottom", "middle", "top")
@@ -21,7 +21,7 @@ _OPEN = 0.12
 _PITCH = np.radians(8.0)
 
 
-class OpenDrawer(Task):
+class OpenDrawer(TableTask):
     """Grasp the bar of the variation's drawer and pull straight out."""
 
     name = "tabletop/open_drawer"

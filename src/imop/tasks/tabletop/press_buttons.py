@@ -13,7 +13,7 @@ from imop.sim.world import World
 from imop.tasks.colors import NAMED, random_color
 from imop.tasks.grasps import backed_off, from_above
 from imop.tasks.layout import Item
-from imop.tasks.task import Task
+from imop.tasks.tabletop.table_task import TableTask
 from imop.tasks.waypoint import Waypoint
 
 COLORS = tuple(NAMED)
@@ -29,7 +29,7 @@ def sequence(variation: int) -> tuple[str, ...]:
     return tuple(COLORS[(start + _STRIDE * k) % len(COLORS)] for k in range(count))
 
 
-class PressButtons(Task):
+class PressButtons(TableTask):
     """Press with the closed gripper from above. Done when these buttons, no others, were pressed in order."""
 
     name = "tabletop/press_buttons"

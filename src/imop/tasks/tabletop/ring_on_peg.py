@@ -14,7 +14,7 @@ from imop.sim.world import World
 from imop.tasks.colors import NAMED, random_color
 from imop.tasks.grasps import backed_off, from_above, shifted
 from imop.tasks.layout import Item
-from imop.tasks.task import Task
+from imop.tasks.tabletop.table_task import TableTask
 from imop.tasks.waypoint import Waypoint
 
 COLORS = tuple(NAMED)
@@ -25,7 +25,7 @@ _TIP = 0.005
 """Of the finger ends above the ring's underside."""
 
 
-class RingOnPeg(Task):
+class RingOnPeg(TableTask):
     """Take the ring by its grip; pegs of other colours and a ring of another colour distract.
 
     So does a can of the same colour.

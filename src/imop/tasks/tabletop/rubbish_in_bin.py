@@ -15,14 +15,14 @@ from imop.sim.world import World
 from imop.tasks.colors import random_color
 from imop.tasks.grasps import backed_off, from_above, shifted
 from imop.tasks.layout import Item
-from imop.tasks.task import Task
+from imop.tasks.tabletop.table_task import TableTask
 from imop.tasks.waypoint import Waypoint
 
 _ROOM = 0.07
 """Around the paper, for the fingers."""
 
 
-class RubbishInBin(Task):
+class RubbishInBin(TableTask):
     """Pick the paper among other small things from above and drop it into the bin."""
 
     name = "tabletop/rubbish_in_bin"

@@ -13,7 +13,7 @@ from imop.sim.world import World
 from imop.tasks.colors import NAMED
 from imop.tasks.grasps import backed_off, from_above, shifted
 from imop.tasks.layout import Item
-from imop.tasks.task import Task
+from imop.tasks.tabletop.table_task import TableTask
 from imop.tasks.waypoint import Waypoint
 
 COLORS = tuple(NAMED)
@@ -31,7 +31,7 @@ def aim(variation: int) -> tuple[str, int]:
     return COLORS[variation // len(COUNTS)], COUNTS[variation % len(COUNTS)]
 
 
-class StackCubes(Task):
+class StackCubes(TableTask):
     """One or two cubes of the variation's colour go onto the plate; cubes of other colours distract."""
 
     name = "tabletop/stack_cubes"

@@ -14,7 +14,7 @@ from imop.sim.world import TABLE_HEIGHT, World
 from imop.tasks.colors import NAMED, random_color
 from imop.tasks.grasps import backed_off, from_above, shifted
 from imop.tasks.layout import Area, Item
-from imop.tasks.task import Task
+from imop.tasks.tabletop.table_task import TableTask
 from imop.tasks.waypoint import Waypoint
 from imop.types import FloatArray
 
@@ -40,7 +40,7 @@ def _target(color: tuple[float, float, float]) -> Any:
     return spec
 
 
-class StraightenRope(Task):
+class StraightenRope(TableTask):
     """Take each end of the rope and lay it onto the mark of its colour; then the rope lies straight."""
 
     name = "tabletop/straighten_rope"

@@ -13,7 +13,7 @@ from imop.sim.world import World
 from imop.tasks.colors import random_color
 from imop.tasks.grasps import backed_off, from_above
 from imop.tasks.layout import Area, Item
-from imop.tasks.task import Task
+from imop.tasks.tabletop.table_task import TableTask
 from imop.tasks.waypoint import Waypoint
 from imop.types import FloatArray
 
@@ -23,7 +23,7 @@ _OTHER = np.radians(15.0)
 """The other handle may be moved by less."""
 
 
-class TurnFaucet(Task):
+class TurnFaucet(TableTask):
     """Grasp the variation's lever from above and turn it a quarter to the front; the other one stays."""
 
     name = "tabletop/turn_faucet"

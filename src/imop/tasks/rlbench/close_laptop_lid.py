@@ -1,0 +1,24 @@
+"""Close the laptop."""
+
+# ruff: noqa: D102 (the methods are described in Task and RLBenchTask)
+from collections.abc import Sequence
+
+from imop.tasks.rlbench.conditions import Condition, JointMoved
+from imop.tasks.rlbench.task import RLBenchTask
+
+
+class CloseLaptopLid(RLBenchTask):
+    """Push the lid over and down."""
+
+    name = "rlbench/close_laptop_lid"
+    words = (
+        "close laptop lid",
+        "close the laptop",
+        "shut the laptop lid",
+    )
+    step_limit = 50
+
+    def conditions(self) -> Sequence[Condition]:
+        return [
+            JointMoved("joint", 1.79),
+        ]

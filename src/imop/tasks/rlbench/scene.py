@@ -1,0 +1,66 @@
+"""A world together with the model that it was made of: objects by the names in the file."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from imop.geometry import se3
+from imop.sim.world import World
+from imop.tasks.coppelia.model import Joint, Model
+from imop.tasks.coppelia.placing import place, recolor
+from imop.tasks.coppelia.sensors import detects
+from imop.tasks.rlbench.colors import COLORS
+from imop.types import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What a task's logic reads and moves. Moving an object moves all below it in the file's tree."""
+
+    world: World
+    model: Model
+
+    def pose(self, name: str, frame: str | None = None) -> FloatArray:
+        """(4, 4) in the world, or in the frame of another object."""
+        T_world_object = self.world.pose(name)
+        if frame is None:
+            return T_world_object
+        T: FloatArray = se3.invert(self.world.pose(frame)) @ T_world_object
+        return T
+
+    def point(self, frame: str, p: tuple[float, float, float]) -> FloatArray:
+        """(3,) in the world, of a point given in the frame of an object."""
+        p_world: FloatArray = (self.pose(frame) @ (*p, 1.0))[:3]
+        return p_world
+
+    def place(self, name: str, T_world_object: FloatArray) -> None:
+        """Put an object at a pose."""
+        place(self.world, self.model, name, T_world_object)
+
+    def move(self, name: str, p_world: Sequence[float] | FloatArray) -> None:
+        """Put an object at a position; it keeps its orientation."""
+        R = self.pose(name)[:3, :3]
+        self.place(name, se3.make(R, np.asarray(p_world, dtype=np.float64)))
+
+    def move_to(self, name: str, other: str) -> None:
+        """Put an object where another is; it keeps its orientation."""
+        self.move(name, self.pose(other)[:3, 3])
+
+    def place_at(self, name: str, other: str) -> None:
+        """Give an object the pose of another."""
+        self.place(name, self.pose(other))
+
+    def paint(self, name: str, color: str) -> None:
+        """Give a shape, but not what hangs on it, one of `COLORS`."""
+        recolor(self.world, name, COLORS[color])
+
+    def detects(self, sensor: str, shape: str) -> bool:
+        """Whether a sensor detects a shape now."""
+        return detects(self.world, self.model, sensor, shape)
+
+    def moved(self, joint: str) -> float:
+        """How far a joint is from its position in the file, radians or metres."""
+        start = self.model[joint]
+        assert isinstance(start, Joint)
+        return abs(self.world.joint(joint) - start.position)

@@ -1,0 +1,232 @@
+"""What RLBench's tasks share: a model file, its random placement, its waypoints, and conditions."""
+
+# ruff: noqa: D102 (the methods are described in Task)
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from imop.errors import PlanFailed
+from imop.geometry import se3
+from imop.sim.kinematics import inverse_kinematics
+from imop.sim.motion import WORKSPACE_LOWER, Planner
+from imop.sim.robot import PANDA_HOME_Q
+from imop.sim.world import ROBOT, World
+from imop.tasks.checks import settle, touched
+from imop.tasks.coppelia.convert import add_model
+from imop.tasks.coppelia.model import Model, PathObject
+from imop.tasks.layout import NoRoom
+from imop.tasks.rlbench import assets
+from imop.tasks.rlbench.conditions import Condition
+from imop.tasks.rlbench.instances import separate, unavoided
+from imop.tasks.rlbench.scene import Scene
+from imop.tasks.rlbench.spawn import WORKSPACE, Boundary, area, place_in
+from imop.tasks.rlbench.waypoints import numbered, path_poses, read_words, thing_of
+from imop.tasks.task import Task
+from imop.tasks.waypoint import Waypoint
+from imop.types import FloatArray
+
+DOWN = se3.euler(x=np.pi) @ se3.euler(z=np.pi)
+"""Orientation of the tip that looks down, its x axis towards the robot's base."""
+_ABOVE_FLOOR = 0.0002
+"""Things that sank onto the table may put waypoints below the workspace, by two millimetres."""
+_TABLE_FRICTION = 0.3
+"""MuJoCo takes the greater friction of two things, the physics of RLBench the product."""
+_ON_THE_WAY, _DEPTH = 12, 0.003
+_ATTEMPTS = 100
+_DRAWS = 100
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A waypoint of the file, where it shall be.
+
+    Attributes:
+        waypoint: its name, whose words count.
+        T_world_tip: (4, 4); where the waypoint is now if None.
+        frame: body on which the step depends; the shape that the waypoint hangs on if None.
+    """
+
+    waypoint: str
+    T_world_tip: FloatArray | None = None
+    frame: str | None = None
+
+
+def _arm_hits(world: World) -> bool:
+    """Whether a link of the arm, not of the hand, is in something."""
+    links = [world.model.body(f"{ROBOT}link{i}").id for i in range(1, 8)]
+    contacts = world.data.contact[: world.data.ncon]
+    bodies = [world.model.geom_bodyid[c.geom] for c in contacts if c.dist < -_DEPTH]
+    return any((a in links) != (b in links) and not {int(a), int(b)} <= world.robot_bodies for a, b in bodies)
+
+
+def carried(
+    scene: Scene, frame: str, moved: str, T_world_moved: FloatArray, names: Sequence[str]
+) -> list[Step]:
+    """Waypoints that hang on waypoint `moved`, or are it, when that is moved to a pose (4, 4).
+
+    Args:
+        scene: the scene.
+        frame: body on which they depend.
+        moved: name of the waypoint.
+        T_world_moved: (4, 4) where it shall be.
+        names: of the waypoints in question.
+    """
+    return [Step(name, T_world_moved @ scene.pose(name, frame=moved), frame) for name in names]
+
+
+class RLBenchTask(Task):
+    """A task whose scene is a model file.
+
+    Attributes:
+        words: instructions, the usual one first; {} stands for the variation's aim.
+        aims: what the instructions say of each variation.
+        yaw: bounds of the turn of the whole task, radians.
+        root: what is placed in the workspace, the whole task unless named.
+        placed: whether it is placed at all.
+        frames: waypoint -> body on which it depends, where that is not the shape it hangs on.
+    """
+
+    insist = True
+    words: ClassVar[tuple[str, ...]]
+    aims: ClassVar[tuple[str, ...]] = ("",)
+    yaw: ClassVar[tuple[float, float]] = (-3.14, 3.14)
+    root: ClassVar[str | None] = None
+    placed: ClassVar[bool] = True
+    frames: Mapping[str, str] = {}
+
+    @abstractmethod
+    def conditions(self) -> Sequence[Condition]:
+        """What has to be met at once for success; made anew for every episode."""
+
+    def fails(self) -> Sequence[Condition]:
+        """What makes success impossible once it was met at once; nothing by default."""
+        return ()
+
+    def instructions(self, variation: int) -> tuple[str, ...]:
+        return tuple(text.replace("{}", self.aims[variation]) for text in self.words)
+
+    def load(self) -> Model:
+        """The model of the scene.
+
+        Raises:
+            AssetMissing: if the user has not provided the file.
+        """
+        return assets.load(self.file())
+
+    @classmethod
+    def file(cls) -> str:
+        """Name of the model file, without .ttm."""
+        return cls.name.split("/")[1]
+
+    def build(self, spec: Any, variation: int, rng: np.random.Generator) -> None:
+        self.variation = variation
+        self.model = self.load()
+        add_model(spec, self.model)
+        for geom in spec.body("table").geoms:
+            geom.friction[0] = _TABLE_FRICTION
+
+    def init_episode(self, scene: Scene, rng: np.random.Generator) -> None:
+        """Arrange the variation's scene, before the task is placed as a whole; nothing by default.
+
+        Raises:
+            NoRoom: if something found no place.
+        """
+
+    def steps(self, scene: Scene) -> Sequence[Step]:
+        """The waypoints in their order; those of the file by default."""
+        return [Step(name) for name in numbered(scene.model)]
+
+    def reset(self, world: World, rng: np.random.Generator) -> None:
+        scene = Scene(world, self.model)
+        separate(world, self.model)
+        world.unavoided = unavoided(world, self.model)
+        untouched = world.save_state()
+        problem = ""
+        for _ in range(_ATTEMPTS):
+            world.restore_state(untouched)
+            self._conditions, self._fails, self._failed = self.conditions(), self.fails(), False
+            try:
+                self.init_episode(scene, rng)
+                if self.placed:
+                    self._place(scene, rng)
+            except NoRoom as error:
+                problem = str(error)
+                continue
+            problem = self._problem(world)
+            if not problem:
+                settle(world)
+                return
+        raise NoRoom(f"{self.name}: no valid scene in {_ATTEMPTS} attempts; the last one: {problem}")
+
+    def _place(self, scene: Scene, rng: np.random.Generator) -> None:
+        root = self.root or self.model.objects[0].name
+        for _ in range(_DRAWS):
+            T = place_in(scene, rng, WORKSPACE, root, self.yaw)
+            if T is not None:
+                scene.place(root, T)
+                return
+        raise NoRoom(f"{root}: does not fit into the workspace")
+
+    def _problem(self, world: World) -> str:
+        """Why the expert could not begin or reach its waypoints, or an empty string."""
+        if things := touched(world):
+            return f"the arm touches {things}"
+        steps = self.waypoints(world)
+        if not all(len(inverse_kinematics(w.target(world), PANDA_HOME_Q, 1)) for w in steps):
+            return "a waypoint is out of reach"
+        state = world.save_state()
+        try:
+            for w in steps:
+                plan = Planner(world).plan(w.target(world), allow_collisions=True, linear=w.linear)
+                steps_of_plan = np.linspace(0, len(plan.positions) - 1, _ON_THE_WAY).astype(int)
+                for q in plan.positions[steps_of_plan]:
+                    world.set_robot(q, 1.0)
+                    if _arm_hits(world):
+                        return "the arm would hit something"
+        except PlanFailed as error:
+            return error.reason
+        finally:
+            world.restore_state(state)
+        return ""
+
+    def waypoints(self, world: World) -> Sequence[Waypoint]:
+        scene, gripper_open, found = Scene(world, self.model), True, []
+        for step in self.steps(scene):
+            words = read_words(self.model[step.waypoint].extension)
+            T = scene.pose(step.waypoint) if step.T_world_tip is None else step.T_world_tip
+            frame = step.frame or self.frames.get(step.waypoint) or thing_of(self.model, step.waypoint)
+            o = self.model[step.waypoint]
+            poses = T @ path_poses(o) if isinstance(o, PathObject) else T[None].copy()
+            poses[:, 2, 3] = np.maximum(poses[:, 2, 3], WORKSPACE_LOWER[2] + _ABOVE_FLOOR)
+            T_frame_poses = se3.invert(scene.pose(frame)) @ poses
+            for k, T_frame_gripper in enumerate(T_frame_poses):
+                last = k == len(poses) - 1
+                gripper_open = words.gripper_open if last and words.gripper_open is not None else gripper_open
+                linear = words.linear or len(poses) > 1
+                found.append(Waypoint(frame, T_frame_gripper, gripper_open, words.ignore_collisions, linear))
+        return found
+
+    def watch(self, world: World) -> None:
+        scene = Scene(world, self.model)
+        self._met(scene)
+        self.on_step(scene)
+
+    def on_step(self, scene: Scene) -> None:
+        """Change what the task changes while it is done, such as a lock; every 0.05 s, nothing by default."""
+
+    def success(self, world: World) -> bool:
+        return self._met(Scene(world, self.model))
+
+    def _met(self, scene: Scene) -> bool:
+        met = [c.met(scene) for c in self._conditions]
+        failed = [c.met(scene) for c in self._fails]
+        self._failed = self._failed or (bool(failed) and all(failed))
+        return all(met) and not self._failed
+
+    @staticmethod
+    def boundary(scene: Scene, rng: np.random.Generator, *planes: str) -> Boundary:
+        """Room for things on planes of the model."""
+        return Boundary(scene, rng, [area(scene, plane) for plane in planes])

@@ -1,0 +1,63 @@
+"""Tasks whose things are scattered over the table, among clutter."""
+
+# ruff: noqa: D102 (the methods are described in Task)
+from abc import abstractmethod
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from imop.sim.world import World
+from imop.tasks.checks import at_rest, overlaps, reachable, rehearse, settle
+from imop.tasks.clutter import add_clutter, clutter_items
+from imop.tasks.layout import ROBOT_FOOT, Item, NoRoom, scatter
+from imop.tasks.task import Task
+
+_ATTEMPTS = 150
+
+
+class TableTask(Task):
+    """A task that says what is to be placed: without overlap, at rest, and within the arm's reach."""
+
+    @abstractmethod
+    def items(self) -> Sequence[Item]:
+        """What has to be placed on the table, the largest first."""
+
+    def arrange(self, world: World, rng: np.random.Generator) -> None:
+        """Complete the scene after the items were placed (a lid onto its pot); nothing by default."""
+
+    def furnish(self, spec: Any, rng: np.random.Generator) -> None:
+        add_clutter(spec, rng)
+
+    def reset(self, world: World, rng: np.random.Generator) -> None:
+        untouched = world.save_state()
+        problem = ""
+        for _ in range(_ATTEMPTS):
+            world.restore_state(untouched)
+            try:
+                self._place(world, rng)
+            except NoRoom as error:
+                problem = str(error)
+                continue
+            problem = self._problem(world)
+            if not problem:
+                return
+        raise NoRoom(f"{self.name}: no valid scene in {_ATTEMPTS} attempts; the last one: {problem}")
+
+    def _place(self, world: World, rng: np.random.Generator) -> None:
+        taken = scatter(world, rng, self.items(), np.array([ROBOT_FOOT]))
+        self.arrange(world, rng)
+        scatter(world, rng, clutter_items(world), taken)
+
+    def _problem(self, world: World) -> str:
+        """What is wrong with the scene, or an empty string; settles the scene."""
+        if touching := overlaps(world):
+            return f"{touching} overlap"
+        steps = self.waypoints(world)
+        if not all(reachable(world, w.target(world), w.allow_collisions) for w in steps):
+            return "a waypoint is out of reach"
+        before = {item.body: world.pose(item.body) for item in (*self.items(), *clutter_items(world))}
+        settle(world)
+        if not at_rest(world, before) or overlaps(world):
+            return "something moves by itself"
+        return rehearse(world, steps)
