@@ -124,10 +124,11 @@ class LearnedStep:
         matches = self._matches(found, seen)
         fit = reposition(found.last, found.p_region, found.p_query).double().numpy()
         inquiry = Inquiry(self._search, query, things, hints, partial(self._opinion, matches))
-        if matches.agreement(fit)[0] > self._matcher.trusted:
-            confirmed = inquiry.confirm(fit[0])
-            if confirmed:
-                return confirmed
+        sure = matches.agreement(fit)[0] > self._matcher.trusted
+        trusted = [*hints, *fit] if sure else list(hints)
+        confirmed = inquiry.confirm(np.stack(trusted)) if trusted else ()
+        if confirmed:
+            return confirmed
         seeds = np.concatenate([fit, self._sampled(matches), self._upright(matches, things)])
         return inquiry.search(seeds)
 

@@ -109,14 +109,16 @@ class Inquiry:
         self._likely = np.stack([*hints, np.eye(4), self._T_repeated])
         self._begun, self._opinion = bool(hints), opinion
 
-    def confirm(self, T: FloatArray) -> tuple[Hypothesis, ...]:
-        """The motions next to a trusted one (4, 4), best first; none if it does not explain the scene.
+    def confirm(self, trusted: FloatArray) -> tuple[Hypothesis, ...]:
+        """The motions next to the best of trusted ones (H, 4, 4); none if it does not explain the scene.
 
         Nor if another likely motion explains it about as well, for then all of them have to be compared.
         """
-        glances = self._judge.glance(np.stack([T, *self._likely]))
-        rivals = ~self._near(self._likely, T) & (glances[1:] > RIVAL * glances[0])
-        if np.any(rivals):
+        motions = np.concatenate([trusted, self._likely])
+        glances = self._judge.glance(motions)
+        best = int(np.argmax(glances[: len(trusted)]))
+        T = motions[best]
+        if np.any(~self._near(motions, T) & (glances > RIVAL * glances[best])):
             return ()
         found = [self._refined(T)]
         T = found[0].T_query_support
@@ -171,10 +173,10 @@ class Inquiry:
         T_repeated[:3, 3] += (se3.apply(T, p) - se3.apply(T_repeated, p))[0]
         return T_repeated
 
-    def _near(self, T_likely: FloatArray, T: FloatArray) -> BoolArray:
+    def _near(self, motions: FloatArray, T: FloatArray) -> BoolArray:
         """(H,) which motions carry the region about where `T` does."""
-        p_likely, p = se3.apply(T_likely, self._center[None])[:, 0], se3.apply(T, self._center[None])[0]
-        near: BoolArray = np.linalg.norm(p_likely - p, axis=1) < ELSEWHERE
+        p_moved, p = se3.apply(motions, self._center[None])[:, 0], se3.apply(T, self._center[None])[0]
+        near: BoolArray = np.linalg.norm(p_moved - p, axis=1) < ELSEWHERE
         return near
 
     def _ordered(self, found: list[Hypothesis]) -> tuple[Hypothesis, ...]:
