@@ -24,6 +24,7 @@ from imop.tasks.rlbench.instances import separate, unavoided
 from imop.tasks.rlbench.scene import Scene
 from imop.tasks.rlbench.spawn import WORKSPACE, Boundary, area, place_in
 from imop.tasks.rlbench.waypoints import numbered, path_poses, read_words, thing_of
+from imop.tasks.rlbench.welds import stiffen_grasps
 from imop.tasks.task import Task
 from imop.tasks.waypoint import Waypoint
 from imop.types import FloatArray
@@ -143,6 +144,7 @@ class RLBenchTask(Task):
         scene = Scene(world, self.model)
         separate(world, self.model)
         world.unavoided = unavoided(world, self.model)
+        stiffen_grasps(world)
         untouched = world.save_state()
         problem = ""
         for _ in range(_ATTEMPTS):
