@@ -118,6 +118,10 @@ class RLBenchTask(Task):
         return assets.load(self.file())
 
     @classmethod
+    def available(cls) -> bool:
+        return assets.available(cls.file())
+
+    @classmethod
     def file(cls) -> str:
         """Name of the model file, without .ttm."""
         return cls.name.split("/")[1]
