@@ -11,7 +11,19 @@ from imop.networks.model import load_model
 from imop.training.shards import write_shard
 from tests.training.test_pairs import pair
 
-VERBS = ("run", "collect", "eval", "import", "export", "check", "predict", "tasks", "train", "model")
+VERBS = (
+    "run",
+    "collect",
+    "eval",
+    "import",
+    "export",
+    "check",
+    "predict",
+    "tasks",
+    "assets",
+    "train",
+    "model",
+)
 POT = "tabletop/lid_off_pot"
 
 

@@ -265,12 +265,36 @@ def tasks(
     from imop.evaluation.contact_sheet import save_contact_sheet, tasks_table
     from imop.evaluation.splits import chosen_tasks
 
-    chosen = chosen_tasks(suite, split)
-    console.print(tasks_table(chosen, suite))
+    console.print(tasks_table(chosen_tasks(suite, split, available=False), suite))
     if contact_sheet is not None:
-        save_contact_sheet(chosen, contact_sheet, jobs, console)
+        save_contact_sheet(chosen_tasks(suite, split), contact_sheet, jobs, console)
         console.print(contact_sheet, highlight=False)
     return 0
+
+
+@app.command
+def assets(suite: Positional[Literal["rlbench"]], source: Annotated[Path, tyro.conf.arg(name="from")]) -> int:
+    """Provide the model files that tasks need: they are copied into the user's cache, never into a package.
+
+    Args:
+        suite: whose files.
+        source: a checkout of RLBench, or any folder with its .ttm files.
+    """
+    from imop.tasks.rlbench import RLBENCH
+    from imop.tasks.rlbench.assets import folder, install
+
+    files = [name.removeprefix(f"{suite}/") for name in RLBENCH]
+    with console.status(f"reading {source}"):
+        problems = install(source, files)
+    for file, problem in problems.items():
+        if problem:
+            console.print(f"[red]{file}.ttm[/]: {problem}", highlight=False)
+    missing = [file for file in files if file not in problems]
+    if missing:
+        console.print(f"not found: {', '.join(missing)}", highlight=False)
+    ready = sum(task.available() for task in RLBENCH.values())
+    console.print(f"{ready} of {len(files)} tasks of {suite} are available, from {folder()}", highlight=False)
+    return 1 if any(problems.values()) else 0
 
 
 @app.command

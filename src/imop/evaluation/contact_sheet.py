@@ -71,5 +71,6 @@ def tasks_table(tasks: list[str], suite: str) -> Table:
         if task.variations > _LISTED:
             shown.append("...")
         counted = f"{task.variations} variation{'s' if task.variations > 1 else ''}"
-        table.add_row(f"{name}\n{split_of[name]}, {counted}", "\n".join(shown))
+        there = "" if task.available() else "\n[red]file missing[/]"
+        table.add_row(f"{name}\n{split_of[name]}, {counted}{there}", "\n".join(shown))
     return table

@@ -1,7 +1,8 @@
 """Which tasks of a suite are meant: by split, by name, or all."""
 
-from imop.errors import InvalidInput
+from imop.errors import AssetMissing, InvalidInput
 from imop.tasks import rlbench
+from imop.tasks.rlbench.assets import COMMAND
 from imop.tasks.tabletop import BASE, CROSS_OBJECT, NOVEL, TABLETOP
 from imop.tasks.task import Task
 
@@ -12,11 +13,20 @@ SPLITS: dict[str, dict[str, dict[str, type[Task]]]] = {
 """Suite -> split -> task by its full name."""
 
 
-def chosen_tasks(suite: str, split: str = "all", tasks: tuple[str, ...] = ()) -> list[str]:
+def chosen_tasks(
+    suite: str, split: str = "all", tasks: tuple[str, ...] = (), available: bool = True
+) -> list[str]:
     """Full names of the tasks of a split, or of those of them that `tasks` names without the suite.
+
+    Args:
+        suite: which suite.
+        split: which of its tasks.
+        tasks: which of these; all if empty.
+        available: leave out tasks whose files are missing, if they are not named.
 
     Raises:
         InvalidInput: for an unknown suite, split or task.
+        AssetMissing: if no task would be left.
     """
     if suite not in SPLITS:
         raise InvalidInput("suite", suite, ", ".join(SPLITS))
@@ -26,4 +36,9 @@ def chosen_tasks(suite: str, split: str = "all", tasks: tuple[str, ...] = ()) ->
     known = [name.removeprefix(f"{suite}/") for name in names]
     if unknown := [task for task in tasks if task not in known]:
         raise InvalidInput("tasks", unknown[0], ", ".join(known))
-    return [f"{suite}/{task}" for task in tasks] or names
+    if tasks:
+        return [f"{suite}/{task}" for task in tasks]
+    present = [name for name in names if SPLITS[suite][split][name].available()]
+    if available and not present:
+        raise AssetMissing(f"the files of all {len(names)} tasks", COMMAND)
+    return present if available else names

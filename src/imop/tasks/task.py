@@ -29,6 +29,11 @@ class Task(ABC):
     insist: ClassVar[bool] = False
     graspable: tuple[str, ...] = ()
 
+    @classmethod
+    def available(cls) -> bool:
+        """Whether all files that the task needs are there."""
+        return True
+
     @abstractmethod
     def instructions(self, variation: int) -> tuple[str, ...]:
         """The aim in words, the usual wording first."""

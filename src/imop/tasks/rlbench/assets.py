@@ -1,10 +1,11 @@
 """Where the tasks' model files are kept: copies in the user's cache, unpacked once."""
 
 import shutil
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 
-from imop.errors import AssetMissing, InvalidInput
+from imop.errors import AssetMissing, InvalidInput, ModelFormatError
 from imop.files import replaced, user_cache
 from imop.tasks.coppelia.cache import load_model
 from imop.tasks.coppelia.model import Model
@@ -55,13 +56,28 @@ def find(source: Path) -> dict[str, Path]:
     return found
 
 
-def install(path: Path) -> Model:
-    """Copy one model file into the user's cache and unpack it there.
+def install(source: Path, files: Iterable[str]) -> dict[str, str]:
+    """Copy model files into the user's cache and unpack them there.
+
+    Args:
+        source: a folder, searched with all below it.
+        files: names without .ttm of the models that are wanted.
+
+    Returns:
+        File name -> what is wrong with it, or nothing; files that were not found are left out.
 
     Raises:
-        ModelFormatError: if it is not a readable model; nothing is copied then.
+        InvalidInput: if `source` is no folder, or has no models.
     """
-    model = load_model(path)
-    with replaced(folder() / path.name) as temporary:
-        shutil.copyfile(path, temporary)
-    return model
+    found, problems = find(source), {}
+    for file in files:
+        if file in found:
+            try:
+                load_model(found[file])
+            except ModelFormatError as error:
+                problems[file] = str(error)
+                continue
+            with replaced(folder() / f"{file}.ttm") as temporary:
+                shutil.copyfile(found[file], temporary)
+            problems[file] = ""
+    return problems

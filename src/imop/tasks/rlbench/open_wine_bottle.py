@@ -4,15 +4,14 @@
 from collections.abc import Sequence
 from typing import Any
 
-import mujoco
 import numpy as np
 
-from imop.sim.world import CONTACT_SOLREF
 from imop.tasks.coppelia.model import Model
 from imop.tasks.rlbench.conditions import Condition, Detected
 from imop.tasks.rlbench.edits import loosened
 from imop.tasks.rlbench.scene import Scene
 from imop.tasks.rlbench.task import RLBenchTask
+from imop.tasks.rlbench.welds import release, weld_to
 
 _LOOSE = np.radians(150.0)
 _THREAD = "thread"
@@ -34,15 +33,11 @@ class OpenWineBottle(RLBenchTask):
 
     def build(self, spec: Any, variation: int, rng: np.random.Generator) -> None:
         super().build(spec, variation, rng)
-        weld = spec.add_equality(name=_THREAD, type=mujoco.mjtEq.mjEQ_WELD)
-        weld.objtype = mujoco.mjtObj.mjOBJ_BODY
-        weld.name1, weld.name2 = "dummy", "cap"
-        weld.solref = CONTACT_SOLREF
+        weld_to(spec, _THREAD, "dummy", "cap")
 
     def on_step(self, scene: Scene) -> None:
         if scene.moved("joint") > _LOOSE:
-            world = scene.world
-            world.data.eq_active[world.model.equality(_THREAD).id] = 0
+            release(scene.world, _THREAD)
 
     def conditions(self) -> Sequence[Condition]:
         return [

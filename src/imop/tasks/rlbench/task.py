@@ -24,6 +24,7 @@ from imop.tasks.rlbench.instances import separate, unavoided
 from imop.tasks.rlbench.scene import Scene
 from imop.tasks.rlbench.spawn import WORKSPACE, Boundary, area, place_in
 from imop.tasks.rlbench.waypoints import numbered, path_poses, read_words, thing_of
+from imop.tasks.rlbench.welds import stiffen_grasps
 from imop.tasks.task import Task
 from imop.tasks.waypoint import Waypoint
 from imop.types import FloatArray
@@ -117,6 +118,10 @@ class RLBenchTask(Task):
         return assets.load(self.file())
 
     @classmethod
+    def available(cls) -> bool:
+        return assets.available(cls.file())
+
+    @classmethod
     def file(cls) -> str:
         """Name of the model file, without .ttm."""
         return cls.name.split("/")[1]
@@ -143,6 +148,7 @@ class RLBenchTask(Task):
         scene = Scene(world, self.model)
         separate(world, self.model)
         world.unavoided = unavoided(world, self.model)
+        stiffen_grasps(world)
         untouched = world.save_state()
         problem = ""
         for _ in range(_ATTEMPTS):
