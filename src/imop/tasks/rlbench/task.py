@@ -54,15 +54,13 @@ class Step:
     frame: str | None = None
 
 
-def _arm_hits(world: World) -> bool:
-    """Whether a link of the arm, not of the hand, is in something that does not give way."""
+def _hits(world: World, bodies: frozenset[int]) -> bool:
+    """Whether any of some bodies is in something that does not give way."""
     m = world.model
-    links = {m.body(f"{ROBOT}link{i}").id for i in range(1, 8)}
     deep = [c.geom for c in world.data.contact[: world.data.ncon] if c.dist < -_DEPTH]
     pairs = [m.geom_bodyid[geoms].tolist() for geoms in deep]
-    return any(
-        (a in links and m.body_weldid[b] == 0) or (b in links and m.body_weldid[a] == 0) for a, b in pairs
-    )
+    both_ways = [pair for a, b in pairs for pair in ((a, b), (b, a))]
+    return any(a in bodies and m.body_weldid[b] == 0 for a, b in both_ways)
 
 
 def carried(
@@ -195,17 +193,17 @@ class RLBenchTask(Task):
         steps = self.waypoints(world)
         if not all(len(inverse_kinematics(w.target(world), PANDA_HOME_Q, 1)) for w in steps):
             return "a waypoint is out of reach"
+        # On a straight way the hand may touch what it works on.
+        links = frozenset(int(world.model.body(f"{ROBOT}link{i}").id) for i in range(1, 8))
         state = world.save_state()
         try:
             for w in steps:
                 plan = Planner(world).plan(w.target(world), allow_collisions=True, linear=w.linear)
-                if w.allow_collisions and not plan.straight:
-                    return "a motion among things would not be straight"
                 # Where collisions matter the real motion may be another one, which ends there, too.
                 first = 0 if w.allow_collisions else len(plan.positions) - 1
                 for k in np.linspace(first, len(plan.positions) - 1, _ON_THE_WAY).astype(int):
                     world.set_robot(plan.positions[k], 1.0)
-                    if _arm_hits(world):
+                    if _hits(world, links if plan.straight else world.robot_bodies):
                         return "the arm would hit something"
         except PlanFailed as error:
             return error.reason
