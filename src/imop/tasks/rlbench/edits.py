@@ -18,16 +18,31 @@ def loosened(model: Model, name: str) -> Model:
     return _with(model, part, replace(part, parent=0, T_parent_object=T_root_part))
 
 
+def fixed(model: Model, name: str) -> Model:
+    """The model with a shape that does not move against what it hangs on.
+
+    Raises:
+        InvalidInput: if there is no such shape.
+    """
+    part = _shape(model, name)
+    return _with(model, part, replace(part, dynamic=False))
+
+
 def hollow(model: Model, name: str) -> Model:
     """The model without contacts of a shape, such as a mesh whose holes MuJoCo would fill.
 
     Raises:
         InvalidInput: if there is no such shape.
     """
+    part = _shape(model, name)
+    return _with(model, part, replace(part, respondable=False))
+
+
+def _shape(model: Model, name: str) -> Shape:
     part = model[name]
     if not isinstance(part, Shape):
         raise InvalidInput("shape", name, "the name of a shape")
-    return _with(model, part, replace(part, respondable=False))
+    return part
 
 
 def _with(model: Model, old: SceneObject, new: SceneObject) -> Model:

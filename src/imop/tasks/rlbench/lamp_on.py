@@ -5,7 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from imop.tasks.coppelia.model import Model
 from imop.tasks.rlbench.conditions import Condition, JointMoved
+from imop.tasks.rlbench.edits import fixed
 from imop.tasks.rlbench.scene import Scene
 from imop.tasks.rlbench.task import RLBenchTask
 
@@ -24,6 +26,9 @@ class LampOn(RLBenchTask):
         "close the gripper and press on the button until the light turns on",
     )
     step_limit = 50
+
+    def load(self) -> Model:
+        return fixed(super().load(), "bulb_phys")
 
     def init_episode(self, scene: Scene, rng: np.random.Generator) -> None:
         scene.paint("bulb", "black")

@@ -2,9 +2,11 @@
 
 # ruff: noqa: D102 (the methods are described in Task and RLBenchTask)
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
+from imop.sim.world import ROBOT
 from imop.tasks.rlbench.colors import NAMES, others
 from imop.tasks.rlbench.conditions import Condition, Detected, NothingGrasped
 from imop.tasks.rlbench.scene import Scene
@@ -24,6 +26,11 @@ class LightBulbIn(RLBenchTask):
         "put the light bulb from the {} casing into the lamp",
     )
     graspable = ("bulb_phys0", "bulb_phys1")
+
+    def build(self, spec: Any, variation: int, rng: np.random.Generator) -> None:
+        super().build(spec, variation, rng)
+        for bulb in self.graspable:  # two millimetres of room in RLBench, none in our hand
+            spec.add_exclude(bodyname1=f"{ROBOT}hand", bodyname2=bulb)
 
     def init_episode(self, scene: Scene, rng: np.random.Generator) -> None:
         color, target = NAMES[self.variation], self.variation % 2

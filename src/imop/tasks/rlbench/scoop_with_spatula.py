@@ -22,6 +22,7 @@ class ScoopWithSpatula(RLBenchTask):
     )
     step_limit = 50
     graspable = ("scoop_with_spatula_spatula",)
+    loose = ("Cuboid",)
     frames = MappingProxyType({"waypoint2": "Cuboid", "waypoint3": "Cuboid"})
 
     def conditions(self) -> Sequence[Condition]:

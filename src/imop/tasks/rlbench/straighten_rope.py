@@ -20,6 +20,7 @@ class StraightenRope(RLBenchTask):
         "pull the rope tight",
     )
     step_limit = 50
+    table_friction = 1.0
 
     def conditions(self) -> Sequence[Condition]:
         return [

@@ -24,6 +24,7 @@ class SweepToDustpanOfSize(RLBenchTask):
         "clean up the dirt with the {} pan",
     )
     graspable = ("broom",)
+    loose = DIRT
 
     def steps(self, scene: Scene) -> Sequence[Step]:
         route = [f"point{self.variation + 1}{letter}" for letter in "abc"]

@@ -24,7 +24,6 @@ from imop.tasks.rlbench.instances import separate, unavoided
 from imop.tasks.rlbench.scene import Scene
 from imop.tasks.rlbench.spawn import WORKSPACE, Boundary, area, place_in
 from imop.tasks.rlbench.waypoints import numbered, path_poses, read_words, thing_of
-from imop.tasks.rlbench.welds import stiffen_grasps
 from imop.tasks.task import Task
 from imop.tasks.waypoint import Waypoint
 from imop.types import FloatArray
@@ -33,10 +32,10 @@ DOWN = se3.euler(x=np.pi) @ se3.euler(z=np.pi)
 """Orientation of the tip that looks down, its x axis towards the robot's base."""
 _ABOVE_FLOOR = 0.0002
 """Things that sank onto the table may put waypoints below the workspace, by two millimetres."""
-_TABLE_FRICTION = 0.3
-"""MuJoCo takes the greater friction of two things, the physics of RLBench the product."""
 _ON_THE_WAY, _DEPTH = 12, 0.003
-_ATTEMPTS = 100
+_STOPPING = 0.05
+"""Seconds in which a loose thing loses most of its speed."""
+_ATTEMPTS = 300
 _DRAWS = 100
 
 
@@ -55,12 +54,13 @@ class Step:
     frame: str | None = None
 
 
-def _arm_hits(world: World) -> bool:
-    """Whether a link of the arm, not of the hand, is in something."""
-    links = [world.model.body(f"{ROBOT}link{i}").id for i in range(1, 8)]
-    contacts = world.data.contact[: world.data.ncon]
-    bodies = [world.model.geom_bodyid[c.geom] for c in contacts if c.dist < -_DEPTH]
-    return any((a in links) != (b in links) and not {int(a), int(b)} <= world.robot_bodies for a, b in bodies)
+def _hits(world: World, bodies: frozenset[int]) -> bool:
+    """Whether any of some bodies is in something that does not give way."""
+    m = world.model
+    deep = [c.geom for c in world.data.contact[: world.data.ncon] if c.dist < -_DEPTH]
+    pairs = [m.geom_bodyid[geoms].tolist() for geoms in deep]
+    both_ways = [pair for a, b in pairs for pair in ((a, b), (b, a))]
+    return any(a in bodies and m.body_weldid[b] == 0 for a, b in both_ways)
 
 
 def carried(
@@ -87,10 +87,15 @@ class RLBenchTask(Task):
         yaw: bounds of the turn of the whole task, radians.
         root: what is placed in the workspace, the whole task unless named.
         placed: whether it is placed at all.
+        table_friction: coefficient of the table.
+        loose: light things that must not jump when something hard pushes them.
         frames: waypoint -> body on which it depends, where that is not the shape it hangs on.
     """
 
     insist = True
+    # MuJoCo takes the greater friction of two things, the physics of RLBench the product.
+    table_friction: ClassVar[float] = 0.3
+    loose: ClassVar[tuple[str, ...]] = ()
     words: ClassVar[tuple[str, ...]]
     aims: ClassVar[tuple[str, ...]] = ("",)
     yaw: ClassVar[tuple[float, float]] = (-3.14, 3.14)
@@ -131,7 +136,7 @@ class RLBenchTask(Task):
         self.model = self.load()
         add_model(spec, self.model)
         for geom in spec.body("table").geoms:
-            geom.friction[0] = _TABLE_FRICTION
+            geom.friction[0] = self.table_friction
 
     def init_episode(self, scene: Scene, rng: np.random.Generator) -> None:
         """Arrange the variation's scene, before the task is placed as a whole; nothing by default.
@@ -148,7 +153,12 @@ class RLBenchTask(Task):
         scene = Scene(world, self.model)
         separate(world, self.model)
         world.unavoided = unavoided(world, self.model)
-        stiffen_grasps(world)
+        for name in self.loose:
+            first, body = int(world.model.joint(name).dofadr[0]), world.model.body(name)
+            world.model.dof_damping[first : first + 6] = [
+                *(3 * [body.mass[0] / _STOPPING]),
+                *(body.inertia / _STOPPING),
+            ]
         untouched = world.save_state()
         problem = ""
         for _ in range(_ATTEMPTS):
@@ -183,14 +193,17 @@ class RLBenchTask(Task):
         steps = self.waypoints(world)
         if not all(len(inverse_kinematics(w.target(world), PANDA_HOME_Q, 1)) for w in steps):
             return "a waypoint is out of reach"
+        # On a straight way the hand may touch what it works on.
+        links = frozenset(int(world.model.body(f"{ROBOT}link{i}").id) for i in range(1, 8))
         state = world.save_state()
         try:
             for w in steps:
                 plan = Planner(world).plan(w.target(world), allow_collisions=True, linear=w.linear)
-                steps_of_plan = np.linspace(0, len(plan.positions) - 1, _ON_THE_WAY).astype(int)
-                for q in plan.positions[steps_of_plan]:
-                    world.set_robot(q, 1.0)
-                    if _arm_hits(world):
+                # Where collisions matter the real motion may be another one, which ends there, too.
+                first = 0 if w.allow_collisions else len(plan.positions) - 1
+                for k in np.linspace(first, len(plan.positions) - 1, _ON_THE_WAY).astype(int):
+                    world.set_robot(plan.positions[k], 1.0)
+                    if _hits(world, links if plan.straight else world.robot_bodies):
                         return "the arm would hit something"
         except PlanFailed as error:
             return error.reason

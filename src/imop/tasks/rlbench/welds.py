@@ -1,12 +1,10 @@
-"""Things that hold each other until a task lets them go, and grasps as stiff as RLBench's."""
+"""Things that hold each other until a task lets them go."""
 
 from typing import Any
 
 import mujoco
 
-from imop.sim.world import CONTACT_SOLREF, GRASP, World
-
-_STIFF = (0.995, 0.9995, 0.001)
+from imop.sim.world import CONTACT_SOLREF, World
 
 
 def weld_to(spec: Any, name: str, holder: str, body: str) -> None:
@@ -20,9 +18,3 @@ def weld_to(spec: Any, name: str, holder: str, body: str) -> None:
 def release(world: World, name: str) -> None:
     """Let go what the weld `name` holds; nothing happens if that was done."""
     world.data.eq_active[world.model.equality(name).id] = 0
-
-
-def stiffen_grasps(world: World) -> None:
-    """Let fingers that squeeze a thing not shift it against the hand."""
-    for body in world.graspable:
-        world.model.eq_solimp[world.model.equality(f"{GRASP}{body}").id, :3] = _STIFF

@@ -1,0 +1,46 @@
+import pytest
+
+from imop.errors import AssetMissing, InvalidInput
+from imop.tasks.env import make_task
+from imop.tasks.rlbench import assets
+from imop.tasks.task import make_scene
+from tests.tasks.coppelia.conftest import cupboard
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+
+def test_a_missing_file_is_named_with_the_command_that_provides_it():
+    with pytest.raises(AssetMissing, match=r"turn_tap\.ttm.*imop assets rlbench --from PATH"):
+        make_scene(make_task("rlbench/turn_tap"), 0, 0, 0)
+    assert not make_task("rlbench/turn_tap").available()
+
+
+def test_wanted_files_are_found_anywhere_and_broken_ones_are_told(tmp_path):
+    source = tmp_path / "rlbench" / "task_ttms"
+    source.mkdir(parents=True)
+    for name in ("lamp_on", "other"):
+        (source / f"{name}.ttm").write_bytes(cupboard())
+    (source / "open_box.ttm").write_bytes(cupboard()[:-9])
+    problems = assets.install(tmp_path, ["lamp_on", "open_box", "turn_tap"])
+    assert problems["lamp_on"] == "" and "byte" in problems["open_box"]
+    assert set(problems) == {"lamp_on", "open_box"}
+    assert assets.available("lamp_on") and not assets.available("open_box") and not assets.available("other")
+    assert "waypoint0" in assets.load("lamp_on").index
+
+
+def test_a_changed_file_is_read_again(tmp_path):
+    (tmp_path / "lamp_on.ttm").write_bytes(cupboard())
+    assets.install(tmp_path, ["lamp_on"])
+    first = assets.load("lamp_on")
+    assert assets.load("lamp_on") is first
+    assets.install(tmp_path, ["lamp_on"])
+    assert assets.load("lamp_on").index == first.index
+
+
+def test_a_folder_without_models_is_no_source(tmp_path):
+    for path in (tmp_path, tmp_path / "none"):
+        with pytest.raises(InvalidInput, match="RLBench"):
+            assets.install(path, ["lamp_on"])
