@@ -40,7 +40,7 @@ class Tolerances:
     hidden: float = 0.5
     around: float = 0.04
     backward: float = 0.25
-    context: float = 0.2
+    context: float = 0.3
 
 
 def shades(colors: Float32Array) -> FloatArray:

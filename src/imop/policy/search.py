@@ -2,16 +2,19 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, farthest_points
-from imop.geometry.neighbours import within
+from imop.geometry.neighbours import nearest, within
 from imop.policy.contacts import SAME
 from imop.policy.evidence import Judge, Surface, Template
 from imop.policy.hypotheses import distinct
 from imop.policy.matcher import Hypothesis, Scene
+from imop.policy.objects import connected
 from imop.policy.refine import FINEST, Refiner, upright
 from imop.policy.region import Region
 from imop.types import BoolArray, FloatArray
@@ -52,7 +55,7 @@ class SearchConfig:
     tilt: float = 0.35
     change: float = 0.12
     sure: float = 0.7
-    opinion: float = 0.04
+    opinion: float = 0.01
 
 
 class Search:
@@ -105,6 +108,7 @@ class Inquiry:
         self._search, self._config, self._center = search, search.config, search.center
         self._judge = Judge(search.template, Surface(things, query.observation.views))
         self._refine = Refiner(things.points)
+        self._points = things.points
         self._T_repeated = query.observation.T_world_gripper @ se3.invert(search.T_world_gripper)
         self._likely = np.stack([*hints, np.eye(4), self._T_repeated])
         self._begun, self._opinion = bool(hints), opinion
@@ -163,8 +167,10 @@ class Inquiry:
         return self._judge.judge(upright(T, self._center))
 
     def _half_turn(self, T: FloatArray) -> FloatArray:
-        """The motion, then half a turn about the vertical through the middle of what it moved."""
-        p = se3.apply(T, middle(self._search.coarse[-1])[None])[0]
+        """The motion, then half a turn about the vertical through the middle of the thing that it led to."""
+        points, labels = self._things
+        led_to = labels[nearest(se3.apply(T, self._search.coarse[0]), points)[1][:, 0]]
+        p = middle(points[labels == np.bincount(led_to).argmax()])
         R = se3.euler(z=np.pi)
         return se3.make(R, p - R @ p) @ T
 
@@ -174,6 +180,11 @@ class Inquiry:
         T_repeated = self._T_repeated.copy()
         T_repeated[:3, 3] += (se3.apply(T, p) - se3.apply(T_repeated, p))[0]
         return T_repeated
+
+    @cached_property
+    def _things(self) -> tuple[FloatArray, NDArray[np.int64]]:
+        """(N, 3) points and (N,) the number of the thing that each belongs to."""
+        return self._points, connected(self._points)
 
     def _near(self, motions: FloatArray, T: FloatArray) -> BoolArray:
         """(H,) which motions carry the region about where `T` does."""
