@@ -14,10 +14,10 @@ HERE, THERE = at(0.1, 0.1), at(0.3, -0.2, yaw=1.2)
 T = THERE @ se3.invert(HERE)
 
 
-def inquiry(poses, hints=(), opinion=None):
+def inquiry(poses, hints=(), opinion=None, weight=0.01):
     cloud = box(SIZE, RED, HERE)
     region = Region(cloud, np.ones(len(cloud)), np.zeros((0, 3)))
-    search = Search(SearchConfig(turned=2), scene([cloud], HOME), region)
+    search = Search(SearchConfig(turned=2, opinion=weight), scene([cloud], HOME), region)
     query = scene([box(SIZE, RED, pose, seed=1 + k) for k, pose in enumerate(poses)], HOME)
     return Inquiry(search, query, find_objects(query.cloud, query.ground.plane).cloud, hints, opinion)
 
@@ -55,5 +55,5 @@ def test_the_matchers_opinion_decides_between_equal_explanations():
         def opinion(T, wanted=wanted):
             return (se3.translation_distance(T @ HERE, wanted @ HERE) < 0.02).astype(float)
 
-        best = inquiry([THERE, other], opinion=opinion).search(np.stack(motions))[0]
+        best = inquiry([THERE, other], opinion=opinion, weight=0.1).search(np.stack(motions))[0]
         assert se3.translation_distance(best.T_query_support @ HERE, wanted @ HERE) < 0.01

@@ -125,6 +125,8 @@ class Inquiry:
         if not np.all(self._near(motions[alike], T)):
             return ()
         found = [self._refined(T)]
+        if found[0].score < 0.5 * self._config.sure:
+            return ()
         T = found[0].T_query_support
         straight = alike[np.argmin(se3.rotation_distance(motions[alike], self._T_repeated))]
         other = self._as_repeated(T) if straight == best else motions[straight]
