@@ -64,7 +64,7 @@ class LearnedMatcher:
     places: int = 2
     turns: int = 24
     search: SearchConfig = field(
-        default_factory=lambda: SearchConfig(refined=6, finished=2, righted=3, turned=2, turn=0.05, sure=0.65)
+        default_factory=lambda: SearchConfig(refined=6, finished=2, righted=3, turned=2, turn=0.05, sure=0.72)
     )
     seed: int = 0
 
@@ -124,8 +124,7 @@ class LearnedStep:
         matches = self._matches(found, seen)
         fit = reposition(found.last, found.p_region, found.p_query).double().numpy()
         inquiry = Inquiry(self._search, query, things, hints, partial(self._opinion, matches))
-        sure = matches.agreement(fit)[0] > self._matcher.trusted
-        trusted = [*hints, *fit] if sure else list(hints)
+        trusted = self._trusted(matches, fit, hints)
         confirmed = inquiry.confirm(np.stack(trusted)) if trusted else ()
         if confirmed:
             return confirmed
@@ -139,6 +138,13 @@ class LearnedStep:
         x, n_x = (t[self._chosen][i].double().numpy() for t in _surface(self._graph))
         y, n_y = (t[best.flatten()].double().numpy() for t in _surface(seen))
         return _Matches(x, n_x, y, n_y, weight.flatten().double().numpy() * self._probability[i] + 1e-6)
+
+    def _trusted(self, m: "_Matches", fit: FloatArray, hints: Sequence[FloatArray]) -> list[FloatArray]:
+        """Motions worth a look before a search; none if many turns are equal, for then a few compete."""
+        if len(self._turns) > 1:
+            return []
+        agreed = m.agreement(fit)[0] > self._matcher.trusted
+        return [*hints, *fit] if agreed else list(hints)
 
     def _opinion(self, m: "_Matches", T: FloatArray) -> FloatArray:
         """(H,) share of the matches that speak for motions (H, 4, 4), in any of the equal turns."""

@@ -117,12 +117,14 @@ class Inquiry:
         motions = np.concatenate([trusted, self._likely])
         glances = self._judge.glance(motions)
         best = int(np.argmax(glances[: len(trusted)]))
-        T = motions[best]
-        if np.any(~self._near(motions, T) & (glances > RIVAL * glances[best])):
+        T, alike = motions[best], np.flatnonzero(glances > RIVAL * glances[best])
+        if not np.all(self._near(motions[alike], T)):
             return ()
         found = [self._refined(T)]
         T = found[0].T_query_support
-        found += [self._refined(self._as_repeated(T)), self._upright(T)]
+        straight = alike[np.argmin(se3.rotation_distance(motions[alike], self._T_repeated))]
+        other = self._as_repeated(T) if straight == best else motions[straight]
+        found += [self._refined(other), self._upright(T)]
         if self._config.turned:
             found.append(self._refined(self._half_turn(T)))
         found.append(self._finished(self._ordered(found)[0].T_query_support))
