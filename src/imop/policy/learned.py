@@ -64,7 +64,7 @@ class LearnedMatcher:
     places: int = 2
     turns: int = 24
     search: SearchConfig = field(
-        default_factory=lambda: SearchConfig(refined=12, finished=2, righted=3, turned=4, turn=0.05, sure=0.72)
+        default_factory=lambda: SearchConfig(finished=2, righted=3, turned=4, turn=0.05, sure=0.72)
     )
     seed: int = 0
 
