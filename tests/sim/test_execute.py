@@ -7,7 +7,7 @@ import pytest
 from imop.errors import PlanFailed
 from imop.geometry import se3
 from imop.sim.execute import execute, move
-from imop.sim.motion import Planner
+from imop.sim.motion import WORKSPACE_LOWER, Planner
 from imop.sim.robot import tip_pose
 from imop.sim.world import TABLE_HEIGHT, World, allow_grasp, scene_spec
 from imop.types import Action, FloatArray
@@ -117,6 +117,15 @@ def test_failed_plan_leaves_the_world_as_it_was() -> None:
     with pytest.raises(PlanFailed, match="unreachable"):
         execute(world, action((0.77, 0.65, 0.8), False))
     assert np.array_equal(world.save_state().physics, before.physics)
+
+
+def test_a_target_below_the_workspace_is_raised_only_if_the_motion_is_insisted_on() -> None:
+    below = action((0.3, 0.0, WORKSPACE_LOWER[2] - 0.01), False, allow_collisions=True)
+    with pytest.raises(PlanFailed):
+        execute(cube_world(), below)
+    world = cube_world()
+    execute(world, below, insist=True)
+    assert abs(world.T_world_gripper[2, 3] - WORKSPACE_LOWER[2]) < 0.002
 
 
 def test_equal_worlds_and_seeds_end_equal() -> None:

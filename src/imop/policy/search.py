@@ -121,7 +121,7 @@ class Inquiry:
         motions = np.concatenate([trusted, self._likely])
         glances = self._judge.glance(motions)
         best = int(np.argmax(glances[: len(trusted)]))
-        T, alike = motions[best], np.flatnonzero(glances > RIVAL * glances[best])
+        T, alike = motions[best], np.flatnonzero(glances >= RIVAL * glances[best])
         if not np.all(self._near(motions[alike], T)):
             return ()
         found = [self._refined(T)]

@@ -7,8 +7,9 @@ import mujoco
 import numpy as np
 
 from imop.errors import PlanFailed
+from imop.geometry import se3
 from imop.sim.gripper import PERIOD_STEPS, OnFrame, set_gripper
-from imop.sim.motion import Planner, Trajectory
+from imop.sim.motion import INSIDE, WORKSPACE_LOWER, WORKSPACE_UPPER, Planner, Trajectory
 from imop.sim.world import World
 from imop.types import Action, FloatArray
 
@@ -86,18 +87,25 @@ def plan_for(
         allow_collisions: let the robot touch its surroundings.
         linear: accept only a straight line of the tip.
         seed: of the motion planner.
-        insist: where nothing is found, plan again with collisions allowed, as RLBench does.
+        insist: take the nearest place in the workspace, and where nothing is found, plan again with
+            collisions allowed, as RLBench's policies and RLBench do.
 
     Raises:
         PlanFailed: if no motion was found.
     """
     planner = Planner(world, seed=seed)
+    goal = _within_workspace(T_world_gripper) if insist else T_world_gripper
     try:
-        return planner.plan(T_world_gripper, allow_collisions, linear)
+        return planner.plan(goal, allow_collisions, linear)
     except PlanFailed:
         if allow_collisions or not insist:
             raise
-        return planner.plan(T_world_gripper, True, linear)
+        return planner.plan(goal, True, linear)
+
+
+def _within_workspace(T_world_gripper: FloatArray) -> FloatArray:
+    p = np.clip(T_world_gripper[:3, 3], WORKSPACE_LOWER + INSIDE, WORKSPACE_UPPER - INSIDE)
+    return se3.make(T_world_gripper[:3, :3], p)
 
 
 def move(world: World, trajectory: Trajectory, on_frame: OnFrame | None = None) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from imop.errors import PlanFailed
 from imop.geometry import se3
 from imop.sim.kinematics import inverse_kinematics
-from imop.sim.motion import WORKSPACE_LOWER, Planner
+from imop.sim.motion import INSIDE, WORKSPACE_LOWER, Planner
 from imop.sim.robot import PANDA_HOME_Q
 from imop.sim.world import ROBOT, World
 from imop.tasks.checks import settle, touched
@@ -30,8 +30,6 @@ from imop.types import FloatArray
 
 DOWN = se3.euler(x=np.pi) @ se3.euler(z=np.pi)
 """Orientation of the tip that looks down, its x axis towards the robot's base."""
-_ABOVE_FLOOR = 0.0002
-"""Things that sank onto the table may put waypoints below the workspace, by two millimetres."""
 _ON_THE_WAY, _DEPTH = 12, 0.003
 _STOPPING = 0.05
 """Seconds in which a loose thing loses most of its speed."""
@@ -219,7 +217,8 @@ class RLBenchTask(Task):
             frame = step.frame or self.frames.get(step.waypoint) or thing_of(self.model, step.waypoint)
             o = self.model[step.waypoint]
             poses = T @ path_poses(o) if isinstance(o, PathObject) else T[None].copy()
-            poses[:, 2, 3] = np.maximum(poses[:, 2, 3], WORKSPACE_LOWER[2] + _ABOVE_FLOOR)
+            # Things that sank onto the table may put waypoints below the workspace, by two millimetres.
+            poses[:, 2, 3] = np.maximum(poses[:, 2, 3], WORKSPACE_LOWER[2] + INSIDE)
             T_frame_poses = se3.invert(scene.pose(frame)) @ poses
             for k, T_frame_gripper in enumerate(T_frame_poses):
                 last = k == len(poses) - 1
