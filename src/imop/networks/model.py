@@ -120,8 +120,6 @@ BUNDLED = Path(__file__).parents[1] / "weights"
 def load_model(folder: Path = BUNDLED) -> Model:
     """Read what `save_model` wrote; nothing is unpickled.
 
-    A routing network of an earlier shape is left out: the model gets an untrained one of the present shape.
-
     Raises:
         CorruptData: if a file is missing, damaged, of another version, or does not fit the configuration.
     """
@@ -137,14 +135,9 @@ def load_model(folder: Path = BUNDLED) -> Model:
     if hashlib.sha256(weights).hexdigest() != card.get("sha256"):
         raise CorruptData(folder / WEIGHTS, "does not have the hash that the card names")
     try:
-        parts, known = card["config"], load(weights)
-        if "routing.standardized.mean" not in known:
-            parts = {name: part for name, part in parts.items() if name not in ("routing", "route_graph")}
-        model = Model(dacite.from_dict(ModelConfig, parts, dacite.Config(cast=[tuple], strict=True)))
-        if "routing" not in parts:
-            fresh = {name: w for name, w in model.state_dict().items() if name.startswith("routing.")}
-            known = {name: w for name, w in known.items() if not name.startswith("routing.")} | fresh
-        model.load_state_dict(known)
+        config = dacite.from_dict(ModelConfig, card["config"], dacite.Config(cast=[tuple], strict=True))
+        model = Model(config)
+        model.load_state_dict(load(weights))
     except (KeyError, dacite.DaciteError, SafetensorError, RuntimeError, TypeError) as error:
         raise CorruptData(folder, f"weights and configuration do not fit ({error})") from error
     return model.eval()

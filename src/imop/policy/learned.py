@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud, farthest_points
+from imop.geometry.cloud import farthest_points
 from imop.geometry.neighbours import nearest, within
 from imop.networks.graph import Graph, build_graph
 from imop.networks.matching import Correspondence, reposition
@@ -24,7 +24,7 @@ from imop.networks.region import StepBatch, one_step
 from imop.policy.contacts import SAME, find_contacts, is_open
 from imop.policy.hypotheses import agreement, sample_motions
 from imop.policy.matcher import Hypothesis, Scene, Transition
-from imop.policy.objects import connected, find_objects
+from imop.policy.objects import find_objects
 from imop.policy.region import Region
 from imop.policy.search import Inquiry, Search, SearchConfig, middle, upright_motions
 from imop.policy.symmetry import equal_turns
@@ -128,7 +128,7 @@ class LearnedStep:
         confirmed = inquiry.confirm(np.stack(trusted)) if trusted else ()
         if confirmed:
             return confirmed
-        seeds = np.concatenate([fit, self._sampled(matches), self._upright(matches, things)])
+        seeds = np.concatenate([fit, self._sampled(matches), self._upright(matches, inquiry)])
         return inquiry.search(seeds)
 
     def _matches(self, found: Correspondence, seen: Graph) -> "_Matches":
@@ -157,13 +157,13 @@ class LearnedStep:
         samples, seed = self._matcher.samples, self._matcher.seed
         return sample_motions(m.x, m.y, m.n_x, m.n_y, m.weight, samples=samples, seed=seed)
 
-    def _upright(self, m: "_Matches", things: PointCloud) -> FloatArray:
+    def _upright(self, m: "_Matches", inquiry: Inquiry) -> FloatArray:
         """(H, 4, 4) motions, in every turn, to the things that most of the region was matched to.
 
         Where something is, the matches say long before they say how it is turned.
         """
-        labels = connected(things.points)
-        thing = labels[nearest(m.y, things.points)[1][:, 0]]
+        points, labels = inquiry.things.points, inquiry.labels
+        thing = labels[nearest(m.y, points)[1][:, 0]]
         weights = np.bincount(thing, weights=m.weight, minlength=labels.max() + 1)
         seeds = []
         for label in np.argsort(-weights)[: self._matcher.places]:
@@ -171,7 +171,7 @@ class LearnedStep:
             if w.sum() > 0.1 * m.weight.sum():
                 x, y = (np.average(points, axis=0, weights=w) for points in (m.x, m.y))
                 seeds.append(upright_motions(x, y[None], self._matcher.turns))
-                place = middle(things.points[labels == label])[None]
+                place = middle(points[labels == label])[None]
                 seeds += [upright_motions(center, place, self._matcher.turns) for center in self._middles]
         return np.concatenate(seeds)
 

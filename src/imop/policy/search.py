@@ -108,7 +108,7 @@ class Inquiry:
         self._search, self._config, self._center = search, search.config, search.center
         self._judge = Judge(search.template, Surface(things, query.observation.views))
         self._refine = Refiner(things.points)
-        self._points = things.points
+        self.things = things
         self._T_repeated = query.observation.T_world_gripper @ se3.invert(search.T_world_gripper)
         self._likely = np.stack([*hints, np.eye(4), self._T_repeated])
         self._begun, self._opinion = bool(hints), opinion
@@ -170,7 +170,7 @@ class Inquiry:
 
     def _half_turn(self, T: FloatArray) -> FloatArray:
         """The motion, then half a turn about the vertical through the middle of the thing that it led to."""
-        points, labels = self._things
+        points, labels = self.things.points, self.labels
         led_to = labels[nearest(se3.apply(T, self._search.coarse[0]), points)[1][:, 0]]
         p = middle(points[labels == np.bincount(led_to).argmax()])
         R = se3.euler(z=np.pi)
@@ -184,9 +184,9 @@ class Inquiry:
         return T_repeated
 
     @cached_property
-    def _things(self) -> tuple[FloatArray, NDArray[np.int64]]:
-        """(N, 3) points and (N,) the number of the thing that each belongs to."""
-        return self._points, connected(self._points)
+    def labels(self) -> NDArray[np.int64]:
+        """(N,) number of the connected thing that each point of `things` belongs to."""
+        return connected(self.things.points)
 
     def _near(self, motions: FloatArray, T: FloatArray) -> BoolArray:
         """(H,) which motions carry the region about where `T` does."""

@@ -25,9 +25,9 @@ from imop.types import FloatArray, as_pose
 
 WORKSPACE_LOWER = np.array([-0.275, -0.655, 0.752])
 WORKSPACE_UPPER = np.array([0.775, 0.655, 1.752])
+"""Where RLBench accepts targets, metres, world frame."""
 INSIDE = 0.0002
 """What is clipped to the workspace ends so far inside of its bounds, metres."""
-"""Where RLBench accepts targets, metres, world frame."""
 
 VELOCITY = np.minimum(JOINT_VELOCITY, 1.5)
 ACCELERATION = np.full(7, 5.0)

@@ -89,10 +89,15 @@ def _add_attach_volume(spec: Any) -> None:
 
 def allow_grasp(spec: Any, body: str) -> None:
     """Declare in `spec` that the gripper attaches `body` when it closes on it."""
-    weld = spec.add_equality(name=f"{GRASP}{body}", type=mujoco.mjtEq.mjEQ_WELD)
+    add_weld(spec, f"{GRASP}{body}", f"{ROBOT}hand", body, active=False)
+
+
+def add_weld(spec: Any, name: str, holder: str, body: str, active: bool = True) -> None:
+    """Let `holder` carry `body` as they stand in `spec` while the weld `name` is active."""
+    weld = spec.add_equality(name=name, type=mujoco.mjtEq.mjEQ_WELD)
     weld.objtype = mujoco.mjtObj.mjOBJ_BODY
-    weld.name1, weld.name2 = f"{ROBOT}hand", body
-    weld.active = False
+    weld.name1, weld.name2 = holder, body
+    weld.active = active
     weld.solref = CONTACT_SOLREF
 
 

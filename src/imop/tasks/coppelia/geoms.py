@@ -1,5 +1,6 @@
 """Pieces of shapes as MuJoCo geometry: what is seen, and what others bump into."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -199,17 +200,20 @@ def _primitive(piece: Piece, solid: bool) -> dict[str, Any] | None:
     return None
 
 
+def own_color(rgb: Sequence[float]) -> list[float]:
+    """A colour (0 .. 1) as a geometry may carry it: MuJoCo reads exactly one grey as "the material's"."""
+    return [0.501 if abs(c - 0.5) < 1e-3 else c for c in rgb]
+
+
 def _add(
     body: Any, piece: Piece, options: dict[str, Any], name: str, shape: Shape, drawn: bool, solid: bool
 ) -> None:
     T = piece.T_shape_mesh
-    # MuJoCo reads exactly this grey as "the material's colour".
-    rgb = [0.501 if abs(c - 0.5) < 1e-3 else c for c in piece.color]
     body.add_geom(
         name=name,
         pos=T[:3, 3],
         quat=Rotation.from_matrix(T[:3, :3]).as_quat(scalar_first=True),
-        rgba=[*rgb, 1.0],
+        rgba=[*own_color(piece.color), 1.0],
         group=SEEN_GROUP if drawn else UNSEEN_GROUP,
         contype=int(solid),
         conaffinity=int(solid),

@@ -13,7 +13,7 @@ from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.sim.world import World
 from imop.tasks.coppelia import dynamics
-from imop.tasks.coppelia.geoms import SEEN_GROUP
+from imop.tasks.coppelia.geoms import SEEN_GROUP, own_color
 from imop.tasks.coppelia.model import Joint, Model
 from imop.types import FloatArray, as_pose
 
@@ -60,5 +60,4 @@ def recolor(world: World, name: str, rgb: Sequence[float], prefix: str = "") -> 
     """
     m = world.model
     own = (m.geom_bodyid == m.body(prefix + name).id) & (m.geom_group == SEEN_GROUP)
-    # MuJoCo reads exactly this grey as "the material's colour".
-    m.geom_rgba[own, :3] = [0.501 if abs(c - 0.5) < 1e-3 else c for c in rgb]
+    m.geom_rgba[own, :3] = own_color(rgb)

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from imop.sim.world import add_weld
 from imop.tasks.coppelia.model import Model
 from imop.tasks.rlbench.conditions import Condition, Detected
 from imop.tasks.rlbench.edits import loosened
 from imop.tasks.rlbench.scene import Scene
 from imop.tasks.rlbench.task import RLBenchTask
-from imop.tasks.rlbench.welds import release, weld_to
 
 _LOOSE = np.radians(150.0)
 _THREAD = "thread"
@@ -33,11 +33,11 @@ class OpenWineBottle(RLBenchTask):
 
     def build(self, spec: Any, variation: int, rng: np.random.Generator) -> None:
         super().build(spec, variation, rng)
-        weld_to(spec, _THREAD, "dummy", "cap")
+        add_weld(spec, _THREAD, "dummy", "cap")
 
     def on_step(self, scene: Scene) -> None:
         if scene.moved("joint") > _LOOSE:
-            release(scene.world, _THREAD)
+            scene.let_go(_THREAD)
 
     def conditions(self) -> Sequence[Condition]:
         return [

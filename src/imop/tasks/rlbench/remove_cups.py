@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from imop.geometry import se3
+from imop.sim.world import add_weld
 from imop.tasks.rlbench.conditions import Condition, Detected, NothingGrasped
 from imop.tasks.rlbench.scene import Scene
 from imop.tasks.rlbench.task import RLBenchTask, Step, carried
-from imop.tasks.rlbench.welds import release, weld_to
 
 MUGS = tuple(f"mug{k}" for k in range(4))
 HOOK = "hook:"
@@ -37,11 +37,11 @@ class RemoveCups(RLBenchTask):
         # In the file the handles are millimetres inside the spokes, from where contacts would throw them.
         for k, mug in enumerate(MUGS):
             spec.add_exclude(bodyname1=mug, bodyname2=f"place_cups_holder_spoke{k}")
-            weld_to(spec, f"{HOOK}{mug}", "place_cups_holder_base", mug)
+            add_weld(spec, f"{HOOK}{mug}", "place_cups_holder_base", mug)
 
     def on_step(self, scene: Scene) -> None:
         for mug in scene.world.held:
-            release(scene.world, f"{HOOK}{mug}")
+            scene.let_go(f"{HOOK}{mug}")
 
     def steps(self, scene: Scene) -> Sequence[Step]:
         steps: list[Step] = []

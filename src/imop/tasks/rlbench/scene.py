@@ -3,12 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from imop.geometry import se3
 from imop.sim.world import World
 from imop.tasks.coppelia.model import Joint, Model
-from imop.tasks.coppelia.placing import place, recolor
+from imop.tasks.coppelia.placing import place, place_position, recolor
 from imop.tasks.coppelia.sensors import detects
 from imop.tasks.rlbench.colors import COLORS
 from imop.types import FloatArray
@@ -40,8 +38,7 @@ class Scene:
 
     def move(self, name: str, p_world: Sequence[float] | FloatArray) -> None:
         """Put an object at a position; it keeps its orientation."""
-        R = self.pose(name)[:3, :3]
-        self.place(name, se3.make(R, np.asarray(p_world, dtype=np.float64)))
+        place_position(self.world, self.model, name, p_world)
 
     def move_to(self, name: str, other: str) -> None:
         """Put an object where another is; it keeps its orientation."""
@@ -54,6 +51,10 @@ class Scene:
     def paint(self, name: str, color: str) -> None:
         """Give a shape, but not what hangs on it, one of `COLORS`."""
         recolor(self.world, name, COLORS[color])
+
+    def let_go(self, weld: str) -> None:
+        """Let go what a weld holds; nothing happens if that was done."""
+        self.world.data.eq_active[self.world.model.equality(weld).id] = 0
 
     def detects(self, sensor: str, shape: str) -> bool:
         """Whether a sensor detects a shape now."""
