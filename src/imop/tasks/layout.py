@@ -1,6 +1,6 @@
 """Putting things on the table at random without overlap."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -85,3 +85,28 @@ def scatter(world: World, rng: np.random.Generator, items: Sequence[Item], taken
         world.set_free_pose(item.body, T)
         taken = np.concatenate([taken, circles])
     return taken
+
+
+def first_valid(world: World, name: str, draw: Callable[[], str], attempts: int) -> None:
+    """Draw scenes, each from the present state, until one has no problem.
+
+    Args:
+        world: is left with the valid scene.
+        name: of the task, for the error.
+        draw: changes the world and says what is wrong with it, nothing if all is well.
+        attempts: how often, at most.
+
+    Raises:
+        NoRoom: if no scene was valid.
+    """
+    untouched = world.save_state()
+    problem = ""
+    for _ in range(attempts):
+        world.restore_state(untouched)
+        try:
+            problem = draw()
+        except NoRoom as error:
+            problem = str(error)
+        if not problem:
+            return
+    raise NoRoom(f"{name}: no valid scene in {attempts} attempts; the last one: {problem}")

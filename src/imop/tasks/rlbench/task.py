@@ -17,7 +17,7 @@ from imop.sim.world import ROBOT, World
 from imop.tasks.checks import settle, touched
 from imop.tasks.coppelia.convert import add_model
 from imop.tasks.coppelia.model import Model, PathObject
-from imop.tasks.layout import NoRoom
+from imop.tasks.layout import NoRoom, first_valid
 from imop.tasks.rlbench import assets
 from imop.tasks.rlbench.conditions import Condition
 from imop.tasks.rlbench.instances import separate, unavoided
@@ -157,23 +157,16 @@ class RLBenchTask(Task):
                 *(3 * [body.mass[0] / _STOPPING]),
                 *(body.inertia / _STOPPING),
             ]
-        untouched = world.save_state()
-        problem = ""
-        for _ in range(_ATTEMPTS):
-            world.restore_state(untouched)
+
+        def draw() -> str:
             self._conditions, self._fails, self._failed = self.conditions(), self.fails(), False
-            try:
-                self.init_episode(scene, rng)
-                if self.placed:
-                    self._place(scene, rng)
-            except NoRoom as error:
-                problem = str(error)
-                continue
-            problem = self._problem(world)
-            if not problem:
-                settle(world)
-                return
-        raise NoRoom(f"{self.name}: no valid scene in {_ATTEMPTS} attempts; the last one: {problem}")
+            self.init_episode(scene, rng)
+            if self.placed:
+                self._place(scene, rng)
+            return self._problem(world)
+
+        first_valid(world, self.name, draw, _ATTEMPTS)
+        settle(world)
 
     def _place(self, scene: Scene, rng: np.random.Generator) -> None:
         root = self.root or self.model.objects[0].name

@@ -10,7 +10,7 @@ import numpy as np
 from imop.sim.world import World
 from imop.tasks.checks import at_rest, overlaps, reachable, rehearse, settle
 from imop.tasks.clutter import add_clutter, clutter_items
-from imop.tasks.layout import ROBOT_FOOT, Item, NoRoom, scatter
+from imop.tasks.layout import ROBOT_FOOT, Item, first_valid, scatter
 from imop.tasks.task import Task
 
 _ATTEMPTS = 150
@@ -30,19 +30,11 @@ class TableTask(Task):
         add_clutter(spec, rng)
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
-        untouched = world.save_state()
-        problem = ""
-        for _ in range(_ATTEMPTS):
-            world.restore_state(untouched)
-            try:
-                self._place(world, rng)
-            except NoRoom as error:
-                problem = str(error)
-                continue
-            problem = self._problem(world)
-            if not problem:
-                return
-        raise NoRoom(f"{self.name}: no valid scene in {_ATTEMPTS} attempts; the last one: {problem}")
+        def draw() -> str:
+            self._place(world, rng)
+            return self._problem(world)
+
+        first_valid(world, self.name, draw, _ATTEMPTS)
 
     def _place(self, world: World, rng: np.random.Generator) -> None:
         taken = scatter(world, rng, self.items(), np.array([ROBOT_FOOT]))
