@@ -3,7 +3,7 @@ import pytest
 
 from imop.geometry import se3
 from imop.geometry.neighbours import nearest
-from imop.training.augment import JITTER, MOVE, augment
+from imop.training.augment import JITTER, MOVE, augment, mirrored
 from tests.training.test_pairs import MOTION, pair
 
 
@@ -20,9 +20,35 @@ def test_the_truth_moves_with_the_scenes(seed):
     assert close.sum() > 20 and np.median(facing[close]) > 0.999
 
 
+MIRROR = np.diag([1.0, -1.0, 1.0, 1.0])
+
+
+def test_a_mirrored_pair_is_still_true_and_mirrored_twice_the_same():
+    before, changed = pair(), mirrored(pair())
+    region = changed.support.points[changed.region]
+    there = se3.apply(changed.T_query_support[0], region)
+    twin = se3.apply(before.T_query_support[0], before.support.points[before.region])
+    np.testing.assert_allclose(there, twin * (1, -1, 1), atol=1e-12)
+    assert np.linalg.det(changed.T_world_goal[:3, :3]) == pytest.approx(1)
+    closing = se3.rotate(before.T_world_goal, np.array([[0.0, 1.0, 0.0]]))
+    np.testing.assert_allclose(
+        se3.rotate(changed.T_world_goal, np.array([[0.0, -1.0, 0.0]])), closing * (1, -1, 1), atol=1e-12
+    )
+    np.testing.assert_array_equal(mirrored(changed).query.points, before.query.points)
+
+
+def test_both_a_pair_and_its_mirror_image_are_drawn():
+    relative = se3.invert(pair().T_world_now) @ pair().T_world_goal
+    changed = [augment(pair(), np.random.default_rng(seed)) for seed in range(12)]
+    moves = [se3.invert(c.T_world_now) @ c.T_world_goal for c in changed]
+    same = [np.allclose(T, relative, atol=1e-9) for T in moves]
+    flipped = [np.allclose(T, MIRROR @ relative @ MIRROR, atol=1e-9) for T in moves]
+    assert all(a != b for a, b in zip(same, flipped, strict=True)) and any(same) and any(flipped)
+
+
 def test_the_gripper_moves_with_its_scene():
     before, changed = pair(), augment(pair(), np.random.default_rng(3))
-    relative = se3.invert(before.T_world_now) @ before.T_world_goal
+    relative = MIRROR @ se3.invert(before.T_world_now) @ before.T_world_goal @ MIRROR
     np.testing.assert_allclose(se3.invert(changed.T_world_now) @ changed.T_world_goal, relative, atol=1e-9)
 
     def closest(p):
@@ -37,8 +63,9 @@ def test_both_sides_move_independently_and_not_too_far():
         changed = augment(pair(), np.random.default_rng(seed))
         T = changed.T_query_support[0] @ se3.invert(MOTION)
         yaws.append(np.arctan2(T[1, 0], T[0, 0]))
-        shift = changed.T_world_goal[:2, 3] - pair().T_world_goal[:2, 3]
-        assert np.abs(shift).max() < MOVE + 0.01
+        sides = (pair(), mirrored(pair()))
+        shifts = [changed.T_world_goal[:2, 3] - side.T_world_goal[:2, 3] for side in sides]
+        assert min(np.abs(shift).max() for shift in shifts) < MOVE + 0.01
     assert np.ptp(yaws) > np.pi
 
 

@@ -8,13 +8,15 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-RELATION = 6
+RELATION = 8
 # Lengths are measured in this unit, metres, before they enter a network.
 UNIT = 0.05
 
 
 def relation(p_i: Tensor, n_i: Tensor, p_j: Tensor, n_j: Tensor) -> Tensor:
     """(..., RELATION) what is known of point j as seen from point i, unchanged by yaw and translation.
+
+    The last two, triple products with the vertical, change their signs in a mirror.
 
     Args:
         p_i: (..., 3) metres.
@@ -33,6 +35,8 @@ def relation(p_i: Tensor, n_i: Tensor, p_j: Tensor, n_j: Tensor) -> Tensor:
             (n_i * direction).sum(-1),
             (n_j * direction).sum(-1),
             (n_i * n_j).sum(-1),
+            n_i[..., 0] * direction[..., 1] - n_i[..., 1] * direction[..., 0],
+            n_j[..., 0] * direction[..., 1] - n_j[..., 1] * direction[..., 0],
         ],
         dim=-1,
     )

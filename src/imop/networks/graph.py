@@ -16,13 +16,17 @@ from torch import Tensor
 from imop.geometry.cloud import PointCloud, concatenate, farthest_points, grid_cells, voxel_downsample
 from imop.geometry.neighbours import nearest
 from imop.geometry.perception import Ground, find_ground
+from imop.networks.bearings import BEARINGS, bearings
 from imop.types import FloatArray
 
 # Statistics of the neighbourhood are taken at these radii, metres.
 RADII = (0.03, 0.07)
 STATISTICS = 9
-POINT_FEATURES = 3 + 2 + STATISTICS * len(RADII)
+# What is lower above the plane, metres, gives no bearing.
+LOW = 0.004
+LOCAL_FEATURES = 3 + 2 + STATISTICS * len(RADII)
 """Colour, height above the plane, vertical part of the normal, and the local statistics."""
+POINT_FEATURES = LOCAL_FEATURES + BEARINGS
 
 
 @dataclass(frozen=True)
@@ -105,12 +109,14 @@ def build_graph(cloud: PointCloud, config: GraphConfig, ground: Ground | None = 
     fine, height = thin(cloud, config, ground)
     assert fine.normals is not None
     points, normals = fine.points, fine.normals
+    thing = height > LOW
     features = np.concatenate(
         [
             fine.colors - 0.5,
             np.clip(height, -0.2, 0.8)[:, None] / 0.2,
             normals[:, 2:],
             *(local_statistics(points, normals, radius) for radius in RADII),
+            bearings(points, normals, thing if thing.any() else ~thing),
         ],
         axis=1,
     )

@@ -23,13 +23,13 @@ from torch import Tensor, nn
 from imop.networks.backbone import Backbone, BackboneConfig
 from imop.networks.blocks import MLP, DenseBlock, Standardized, exact, pad, pool_max, pool_mean
 from imop.networks.changes import CHANGES
-from imop.networks.graph import POINT_FEATURES, Graph, collate
+from imop.networks.graph import LOCAL_FEATURES, Graph, collate
 from imop.networks.surroundings import FIT, fit, surroundings
 from imop.types import FloatArray
 
 HAND_FEATURES = 7
-INPUTS = POINT_FEATURES + HAND_FEATURES + CHANGES
-"""Numbers per point."""
+INPUTS = LOCAL_FEATURES + HAND_FEATURES + CHANGES
+"""Numbers per point, no bearings: where a point is as seen from the gripper says more."""
 GRIPPER = 5
 ROBOT = 2 * GRIPPER + 3
 PLACE = 7 + 6
@@ -157,7 +157,7 @@ class RoutingNetwork(nn.Module):
         hand, robot = _hand_features(local, distance), _robot_features(states)
         if not self.config.low_dimensional:
             hand, robot = hand * 0, robot * 0
-        points = torch.cat([graph.features, hand, states.change], dim=1)
+        points = torch.cat([graph.features[:, :LOCAL_FEATURES], hand, states.change], dim=1)
         if self.backbone is not None:
             points = self.backbone(graph, points).float()
         pooled = torch.cat([*self._pooled(states, points, distance), robot], dim=1)

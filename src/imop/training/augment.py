@@ -25,9 +25,11 @@ def augment(pair: StepPair, rng: np.random.Generator) -> StepPair:
     """The pair with both scenes moved independently, in other light, and seen less well.
 
     Both sides turn freely about the vertical, move by up to `MOVE` metres and tilt by up to `TILT` radians;
-    poses, normals and the right motions go with them. Colours change together and a little apart; points and
-    whole views are lost.
+    poses, normals and the right motions go with them. Half of all pairs are mirrored first. Colours change
+    together and a little apart; points and whole views are lost.
     """
+    if rng.random() < 0.5:
+        pair = mirrored(pair)
     A, B = _motion(rng, pair.T_world_goal[:3, 3]), _motion(rng, pair.query.points.mean(axis=0))
     light = random_light(rng, 0.25)
     support, region = _worse(pair.support, rng, pair.region)
@@ -43,6 +45,26 @@ def augment(pair: StepPair, rng: np.random.Generator) -> StepPair:
         T_world_goal=A @ pair.T_world_goal,
         T_world_now=A @ pair.T_world_now,
         T_query_support=B @ pair.T_query_support @ se3.invert(A),
+    )
+
+
+def mirrored(pair: StepPair) -> StepPair:
+    """The pair in a mirror, both scenes and all poses. A parallel gripper is its own mirror image."""
+    M = np.diag([1.0, -1.0, 1.0, 1.0])
+
+    def cloud(seen: PointCloud) -> PointCloud:
+        flip = np.array([1.0, -1.0, 1.0])
+        normals = None if seen.normals is None else seen.normals * flip
+        return replace(seen, points=seen.points * flip, normals=normals)
+
+    return replace(
+        pair,
+        support=cloud(pair.support),
+        after=cloud(pair.after),
+        query=cloud(pair.query),
+        T_world_goal=M @ pair.T_world_goal @ M,
+        T_world_now=M @ pair.T_world_now @ M,
+        T_query_support=M @ pair.T_query_support @ M,
     )
 
 
