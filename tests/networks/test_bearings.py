@@ -40,7 +40,7 @@ def test_left_and_right_lever_of_a_faucet_are_told_apart():
 
 
 def test_points_that_do_not_count_give_no_bearing():
-    far = np.concatenate([POINTS, RNG.uniform(0, 0.1, (20, 3)) + (0, 0, -0.05)])
+    far = np.concatenate([POINTS, RNG.uniform(-0.1, 0.05, (20, 3))])
     normals = np.concatenate([NORMALS, np.tile((0.0, 0.0, 1.0), (20, 1))])
     counted = np.concatenate([THING, np.zeros(20, dtype=bool)])
     np.testing.assert_allclose(

@@ -185,6 +185,8 @@ def test_every_parameter_of_the_matching_network_learns(attention):
     silent = [name for name, p in network.named_parameters() if p.grad is None or not p.grad.any()]
     # Before the first repositioning nothing is known about who is near whom.
     unused = ("region_cross.0.attention.position.0", "query_cross.0.attention.position.0")
+    # The softmax over neighbours takes no notice of what is added to all of them; rounding sometimes does.
+    silent = [name for name in silent if not name.endswith("attention.weight.2.bias")]
     assert all(name.startswith(unused) for name in silent), silent
 
 
