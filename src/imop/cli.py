@@ -29,7 +29,7 @@ def run(
     variation: int = 0,
     instance: int = 0,
     demo: Path | None = None,
-    method: Literal["learned", "replay", "registration", "oracle"] = "learned",
+    method: Literal["learned", "routed", "replay", "registration", "oracle"] = "learned",
     weights: Path | None = None,
     min_confidence: float = 0.0,
     video: bool = True,

@@ -11,12 +11,12 @@ from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeRemainin
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.report import Count, Results
 from imop.evaluation.rollout import rollout
-from imop.evaluation.trials import Trial, demonstration_for, make_policy, suite_trials
+from imop.evaluation.trials import Trial, demonstration_for, make_policy, most_actions, suite_trials
 from imop.tasks.expert import ExpertFailed, perform
 from imop.tasks.layout import NoRoom
 from imop.types import Demonstration
 
-METHODS = ("replay", "registration", "learned", "oracle", "expert")
+METHODS = ("replay", "registration", "learned", "routed", "oracle", "expert")
 
 NOTES = (
     "One demonstration per task and variation, from a scene that is never tested.",
@@ -84,7 +84,7 @@ def _succeeds(trial: Trial, demonstration: Demonstration, method: str, weights: 
     policy = make_policy(method, env.world, weights=weights)
     try:
         policy.watch(demonstration if method == "oracle" else demonstration.stripped())
-        return rollout(env, policy, len(demonstration)).success
+        return rollout(env, policy, most_actions(method, demonstration, env.task)).success
     except ImopError:
         # What a policy cannot handle it has failed at; the other methods and scenes go on.
         return False

@@ -10,7 +10,7 @@ from imop.evaluation.open_loop import Prediction, predict
 from imop.evaluation.picture import Panel, save_picture
 from imop.evaluation.report import save_json
 from imop.evaluation.rollout import Rollout, rollout
-from imop.evaluation.trials import Trial, make_policy
+from imop.evaluation.trials import Trial, make_policy, most_actions
 from imop.evaluation.video import save_video
 from imop.geometry import se3
 from imop.sim.cameras import look_at, render_view
@@ -69,7 +69,7 @@ def perform(
         step = action.match.step if action.match else len(panels)
         panels.append(Panel(demonstration.keyframes[step], observation, action, f"step {step}"))
 
-    result = rollout(env, policy, len(demonstration), expert_pose, on_action)
+    result = rollout(env, policy, most_actions(method, demonstration, env.task), expert_pose, on_action)
     save_json({**asdict(trial), "method": method, **result.as_dict()}, out / "result.json")
     if panels:
         save_picture(panels, out / "steps.png")

@@ -17,6 +17,7 @@ from imop.sim.world import World
 from imop.tasks.env import ImopEnv, make_env, make_task
 from imop.tasks.expert import ExpertFailed, record_demonstration
 from imop.tasks.layout import NoRoom
+from imop.tasks.task import Task
 from imop.types import Demonstration
 
 DEMONSTRATION_SEED = 1_000_000
@@ -94,7 +95,8 @@ def make_policy(
     """A fresh policy by the name of its method.
 
     Args:
-        method: learned, replay, registration or oracle.
+        method: learned, routed (learned, and the routing network chooses the step), replay, registration or
+            oracle.
         world: the simulated world, which only the oracle reads.
         min_confidence: of the one-shot policies.
         weights: folder of the learned policy's weights; by default the bundled ones.
@@ -107,8 +109,15 @@ def make_policy(
     perception = Perception(panda_self_filter().is_robot)
     if method == "registration":
         return OneShotPolicy(RegistrationMatcher(), perception, min_confidence=min_confidence)
-    if method == "learned":
-        return OneShotPolicy.from_pretrained(weights or BUNDLED, perception, min_confidence)
+    if method in ("learned", "routed"):
+        return OneShotPolicy.from_pretrained(
+            weights or BUNDLED, perception, min_confidence, routed=method == "routed"
+        )
     if method == "oracle" and world is not None:
         return OraclePolicy(world)
-    raise InvalidInput("method", method, "learned, replay, registration, or (in simulation) oracle")
+    raise InvalidInput("method", method, "learned, routed, replay, registration, or (in simulation) oracle")
+
+
+def most_actions(method: str, demonstration: Demonstration, task: Task) -> int:
+    """As many as were demonstrated, or as the task allows to a method that can go back to a step."""
+    return task.step_limit if method == "routed" else len(demonstration)
