@@ -8,6 +8,7 @@ import numpy as np
 from imop.geometry import se3
 from imop.sim.parts.shapes import METAL, PLASTIC, WOOD, Color, box, capsule, cylinder, part
 from imop.training.families.fittings import ball, inner, rod
+from imop.training.families.solids import QUARTER_TURNS
 from imop.training.families.thing import Hold, Moving, Thing, from_above, paint, up
 
 
@@ -86,7 +87,7 @@ def chain(shape: np.random.Generator, color: np.random.Generator) -> Thing:
     hold = Hold(from_above((-end / 2, 0, 0)), "grip", 2 * wide)
     turn = shape.uniform(0.6, 1.0)
     moving = (Moving("grip", (-turn, turn), hold), Moving("grip", (turn, -turn), hold))
-    return Thing(spec, spots=(up(z=z),), moving=moving, bends=tuple(bends))
+    return Thing(spec, spots=(up(z=z),), moving=moving, bends=tuple(bends), symmetry=QUARTER_TURNS)
 
 
 def lamp(shape: np.random.Generator, color: np.random.Generator) -> Thing:

@@ -11,8 +11,8 @@ from imop.sim.parts.shapes import METAL, PLASTIC, WOOD, Color, Point, box, rgba
 from imop.training.families.thing import from_above
 from imop.types import FloatArray
 
-UPRIGHT = se3.euler(y=np.pi / 2)
-"""Takes z to +x and x to -z: a board that lies becomes one that stands and faces +x."""
+AHEAD = UPRIGHT = se3.euler(y=np.pi / 2)
+"""Takes z to +x and x to -z: a tip points ahead; a board that lies becomes one that stands and faces +x."""
 _FOOT = 0.04
 
 

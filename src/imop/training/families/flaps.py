@@ -9,6 +9,7 @@ from imop.sim.parts.shapes import METAL, PLASTIC, WOOD, Color, box, capsule, cyl
 from imop.training.families.cabinets import open_box
 from imop.training.families.fittings import ball, inner, link, rod, slanted
 from imop.training.families.levers import both_ways
+from imop.training.families.solids import QUARTER_TURNS
 from imop.training.families.thing import Hold, Moving, Thing, from_above, from_front, from_side, paint, up
 
 
@@ -27,10 +28,10 @@ def solar(shape: np.random.Generator, color: np.random.Generator) -> Thing:
         box(sheet, (-0.85 * x, low + 0.003, 0), (0.7 * x, low + pitch - 0.003, 2 * t + 0.0007), face, 80)
     at = shape.uniform(-0.6, 0.6) * y
     edge = Hold(from_front((x - 0.012, at, t), shape.uniform(0.3, 0.6)), "panel", 2 * t)
-    low, high = shape.uniform(-0.6, -0.1), shape.uniform(0.3, 0.6)
+    low, high = shape.uniform(-0.5, -0.1), shape.uniform(0.3, 0.5)
     press = Hold(from_above((0.8 * x, at, 2 * t)), "panel", 0.0)
     moving = (*both_ways("panel", low, high, edge), Moving("panel", (low, high), press, push=True))
-    return Thing(spec, moving=moving)
+    return Thing(spec, moving=moving, symmetry=QUARTER_TURNS)
 
 
 def easel(shape: np.random.Generator, color: np.random.Generator) -> Thing:
@@ -135,8 +136,8 @@ def letterbox(shape: np.random.Generator, color: np.random.Generator) -> Thing:
     tab = Hold(from_side((2 * t + 0.012, at, 0.01 - long), down=shape.uniform(0.1, 0.5)), "flap", 2 * w)
     moving = list(both_ways("flap", 0.0, shape.uniform(0.5, 1.1), tab))
     if cat:
-        press = Hold(from_side((2 * t, -at, 0.02 - long)), "flap", 0.0)
-        moving.append(Moving("flap", (0.0, -shape.uniform(0.5, 0.9)), press, push=True))
+        press = Hold(from_side((2 * t, -at, 0.02 - long), down=shape.uniform(0.6, 0.9)), "flap", 0.0)
+        moving.append(Moving("flap", (0.0, -shape.uniform(0.4, 0.7)), press, push=True))
     return Thing(spec, moving=tuple(moving))
 
 

@@ -17,7 +17,7 @@ def latch(shape: np.random.Generator, color: np.random.Generator) -> Thing:
     """A gate latch: a bar on a board that turns out of its keeper."""
     side, long = float(shape.choice((-1.0, 1.0))), shape.uniform(0.07, 0.12)
     upright = bool(shape.random() < 0.6)
-    x = shape.uniform(0.12, 0.14) if upright else shape.uniform(0.03, 0.06)
+    x = shape.uniform(0.13, 0.15) if upright else shape.uniform(0.03, 0.06)
     y, w, high = long / 2 + shape.uniform(0.01, 0.04), shape.uniform(0.005, 0.009), 0.014
     spec, body = part(fixed=True)
     plate = board(body, x, y, upright, paint(color))
@@ -34,7 +34,7 @@ def latch(shape: np.random.Generator, color: np.random.Generator) -> Thing:
     a, b = sorted((end - side * 0.006, end - side * 0.022))
     box(plate, (w + 0.002, a, 0), (w + 0.012, b, high + 0.012), keeper, METAL)
     hold = Hold(from_above((0, side * 0.6 * long, 0.004), np.pi / 2), "bar", 2 * w)
-    turn = shape.uniform(0.9, 1.6)
+    turn = shape.uniform(0.8, 1.2 if upright else 1.6)
     return Thing(spec, moving=both_ways("bar", 0.0, turn, hold))
 
 
@@ -89,7 +89,7 @@ def crank(shape: np.random.Generator, color: np.random.Generator) -> Thing:
     capsule(arm, (long, 0, 0.01), (long, 0, grip), knob, paint(color), PLASTIC)
     yaw = shape.uniform(-0.6, 0.6)
     hold = Hold(from_above((long, 0, grip), yaw), "crank", 2 * knob)
-    return Thing(spec, moving=both_ways("crank", 0.0, shape.uniform(0.8, 2.2), hold))
+    return Thing(spec, moving=both_ways("crank", 0.0, shape.uniform(0.8, 1.7), hold))
 
 
 def pump(shape: np.random.Generator, color: np.random.Generator) -> Thing:
