@@ -7,7 +7,7 @@ import numpy as np
 
 from imop.geometry import se3
 from imop.sim.parts.shapes import METAL, PLASTIC, WOOD, Color, box, capsule, cylinder, part
-from imop.training.families.fittings import ball, inner, rod
+from imop.training.families.fittings import TIP, ball, inner, rod
 from imop.training.families.solids import QUARTER_TURNS
 from imop.training.families.thing import Hold, Moving, Thing, from_above, paint, up
 
@@ -67,8 +67,8 @@ def chain(shape: np.random.Generator, color: np.random.Generator) -> Thing:
     x, z = shape.uniform(0.015, 0.03), shape.uniform(0.015, 0.04)
     spec, body = part(fixed=True)
     box(body, (-x, -x, 0), (x, x, z), paint(color), WOOD)
-    if shape.random() < 0.5:
-        cylinder(body, 0.4 * x, z, z + 0.012, paint(color), PLASTIC)
+    high = shape.uniform(0.004, 0.02)
+    cylinder(body, shape.uniform(0.3, 0.8) * x, z, z + high, paint(color), PLASTIC)
     beads, colors = bool(shape.random() < 0.5), (paint(color), paint(color))
     r, pitch, pieces = shape.uniform(0.005, 0.009), shape.uniform(0.018, 0.026), int(shape.integers(4, 9))
     piece, bends, at = body, [], (-x, 0.0, r)
@@ -84,10 +84,10 @@ def chain(shape: np.random.Generator, color: np.random.Generator) -> Thing:
     grip = _joined(piece, "grip", at)
     end, wide = shape.uniform(0.03, 0.05), shape.uniform(0.008, 0.014)
     box(grip, (-end, -wide, -r), (0, wide, r), paint(color), PLASTIC)
-    hold = Hold(from_above((-end / 2, 0, 0)), "grip", 2 * wide)
+    hold = Hold(from_above((-end / 2, 0, TIP - r)), "grip", 2 * wide)
     turn = shape.uniform(0.6, 1.0)
     moving = (Moving("grip", (-turn, turn), hold), Moving("grip", (turn, -turn), hold))
-    return Thing(spec, spots=(up(z=z),), moving=moving, bends=tuple(bends), symmetry=QUARTER_TURNS)
+    return Thing(spec, spots=(up(z=z + high),), moving=moving, bends=tuple(bends), symmetry=QUARTER_TURNS)
 
 
 def lamp(shape: np.random.Generator, color: np.random.Generator) -> Thing:
@@ -99,7 +99,8 @@ def lamp(shape: np.random.Generator, color: np.random.Generator) -> Thing:
         cylinder(body, base, 0, 0.015, foot, METAL)
     else:
         box(body, (-base, -base, 0), (base, base, 0.015), foot, METAL)
-    ball(body, (0.6 * base, 0.5 * base, 0.015), (0.006, 0.006, 0.006), paint(color))
+    knob = 0.3 * base
+    ball(body, (0.5 * base, 0.4 * base, 0.015), (knob, knob, 0.012), paint(color))
     pieces = int(shape.integers(2, 4)) if shape.random() < 0.5 else int(shape.integers(5, 9))
     pitch, lean = shape.uniform(0.13, 0.2) / pieces, shape.uniform(-0.2, 0.2)
     piece = inner(body, "socket", se3.euler(y=lean), (-0.4 * base, 0, 0.012))

@@ -13,6 +13,8 @@ from imop.types import FloatArray
 
 AHEAD = UPRIGHT = se3.euler(y=np.pi / 2)
 """Takes z to +x and x to -z: a tip points ahead; a board that lies becomes one that stands and faces +x."""
+TIP = 0.0095
+"""Height over the table at which flat things are taken: fingers reach 8 mm beyond the gripper's frame."""
 _FOOT = 0.04
 
 
@@ -93,4 +95,4 @@ def down_upright(p: tuple[float, float, float]) -> FloatArray:
 
 
 def _wxyz(R: FloatArray) -> list[float]:
-    return np.roll(se3.to_pose7(se3.make(R))[3:], 1).tolist()
+    return [float(v) for v in np.roll(se3.to_pose7(se3.make(R))[3:], 1)]

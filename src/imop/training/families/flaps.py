@@ -117,7 +117,8 @@ def letterbox(shape: np.random.Generator, color: np.random.Generator) -> Thing:
         _frame(body, (x, y, z), (half, low, high), shell)
         box(body, (-0.05, -y, 0), (0.05, y, 0.008), shell, WOOD)
         side = float(shape.choice((-1.0, 1.0)))
-        ball(body, (x, side * 0.5 * (half + y), 0.8 * z), (0.008, 0.008, 0.008), mark)
+        a, b = sorted((side * (half + 0.003), side * y))
+        box(body, (x, a, 0.6 * z), (x + 0.006, b, 0.85 * z), mark, PLASTIC)
     else:
         box(body, (-x, -y, 0), (x, y, z), shell, WOOD)
         rod(body, (-x, 0, z), (x, 0, z), y, shell)

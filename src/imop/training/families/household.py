@@ -5,7 +5,7 @@ import numpy as np
 from imop.geometry import se3
 from imop.sim.parts import lathe
 from imop.sim.parts.shapes import METAL, PLASTIC, WOOD, box, capsule, cylinder, part
-from imop.training.families.fittings import AHEAD, ball, inner, rod, slanted
+from imop.training.families.fittings import AHEAD, TIP, ball, inner, rod, slanted
 from imop.training.families.thing import TURNS, Hold, Thing, from_above, from_side, paint, revolution, up
 from imop.types import FloatArray
 
@@ -63,7 +63,7 @@ def torch(shape: np.random.Generator, color: np.random.Generator) -> Thing:
         lens = inner(body, "head", AHEAD, (long, 0, big))
         lathe.solid(spec, lens, "cone", [(r, 0), (big, 0.02), (big, 0.035)], second, PLASTIC, 16)
         cylinder(lens, 0.85 * big, 0.035, 0.036, paint(color), PLASTIC)
-        grips = (Hold(from_above((shape.uniform(-0.4, 0.1) * long, 0, big)), width=2 * r),)
+        grips: tuple[Hold, ...] = (Hold(from_above((shape.uniform(-0.4, 0.1) * long, 0, big)), width=2 * r),)
         return Thing(spec, grips, symmetry=_about_x(big), tool=se3.make(AHEAD, (long + 0.036, 0, big)))
     if style < 0.7:
         rod(body, (-long, 0, big), (long, 0, big), r, first)
@@ -99,9 +99,10 @@ def scissors(shape: np.random.Generator, color: np.random.Generator) -> Thing:
         eye = inner(body, f"loop{k}", np.eye(3), (*(R @ (-back - loop, 0, 0))[:2], 0.0))
         lathe.shell(spec, eye, f"loop{k}", [(loop, 0.0), (loop, 4 * t)], 0.004, grip, PLASTIC, 12)
     rod(body, (0, 0, 0), (0, 0, 4 * t + 0.002), 0.7 * w, grip)
+    high = max(3 * t, TIP)
     grips = (
-        Hold(from_above((0, 0, 3 * t)), width=2.6 * w),
-        Hold(from_above((-back - loop, 0, 3 * t)), width=min(2 * (loop + (back + loop) * a), 0.078)),
+        Hold(from_above((0, 0, high)), width=2.6 * w),
+        Hold(from_above((-back - loop, 0, high)), width=min(2 * (loop + (back + loop) * a), 0.078)),
     )
     return Thing(spec, grips, tool=se3.make(AHEAD, (front, 0, 2 * t)))
 

@@ -68,7 +68,7 @@ def crank(shape: np.random.Generator, color: np.random.Generator) -> Thing:
     """A hand mill: a crank with a knob, on its top or in front."""
     x, y, z = shape.uniform(0.03, 0.05), shape.uniform(0.03, 0.05), shape.uniform(0.05, 0.1)
     front = bool(shape.random() < 0.5)
-    z += 0.05 if front else 0.0
+    z += 0.08 if front else 0.0
     spec, body = part(fixed=True)
     case = paint(color)
     box(body, (-x, -y, 0), (x, y, z), case, WOOD)

@@ -31,7 +31,7 @@ def kettle(shape: np.random.Generator, color: np.random.Generator) -> Thing:
     if shape.random() < 0.5:
         over, half = h + shape.uniform(0.035, 0.05), 0.75 * bulge
         bow = [(-half, 0, 0.7 * h), (-0.6 * half, 0, over), (0.6 * half, 0, over), (half, 0, 0.7 * h)]
-        grips = (
+        grips: tuple[Hold, ...] = (
             Hold(from_above((0, 0, over)), width=2 * bar),
             Hold(from_above((-0.4 * half, 0, over)), width=2 * bar),
         )

@@ -6,7 +6,7 @@ import numpy as np
 
 from imop.geometry import se3
 from imop.sim.parts.shapes import PLASTIC, WOOD, box, capsule, part
-from imop.training.families.fittings import rod, slanted
+from imop.training.families.fittings import TIP, rod, slanted
 from imop.training.families.solids import HALF_TURN
 from imop.training.families.thing import Hold, Thing, from_above, paint, up
 from imop.types import FloatArray
@@ -33,7 +33,7 @@ def sorter(shape: np.random.Generator, color: np.random.Generator) -> Thing:
             for a, b in ((ends[0], tops[0]), (tops[0], tops[1]), (tops[1], ends[1])):
                 capsule(body, a, b, 0.002, dividers, PLASTIC)
     shared = paint(color) if shape.random() < 0.3 else None
-    spots = []
+    spots: list[FloatArray] = []
     for k in range(count):
         x = (k + 0.5) * pitch - half
         if shape.random() < 0.45 and (len(spots) or k < count - 1):
@@ -63,7 +63,7 @@ def slab(shape: np.random.Generator, color: np.random.Generator) -> Thing:
     symmetry = _DECORATIONS[int(shape.integers(len(_DECORATIONS)))](shape, color, flat, (x, y, t))
     at = shape.uniform(-0.5, 0.5) * x
     deep = min(0.02, y)
-    grip = (at, y - deep, 0.0) if stands else (at, 0.0, 0.3 * t)
+    grip = (at, y - deep, 0.0) if stands else (at, 0.0, max(0.3 * t, TIP - t))
     p = se3.apply(T_body_flat, np.array([grip]))[0]
     grips = [Hold(from_above(tuple(p.tolist())), width=2 * t if stands else 2 * y)]
     if stands and x < 0.06:
@@ -101,7 +101,7 @@ def _screen(shape: np.random.Generator, color: np.random.Generator, body: Any, s
     box(body, (-0.8 * x, -0.88 * y, t - 0.001), (0.8 * x, 0.88 * y, t + 0.0006), paint(color), PLASTIC)
     if shape.random() < 0.4:
         return HALF_TURN
-    box(body, (0.86 * x, -0.1 * y, t), (0.95 * x, 0.1 * y, t + 0.0008), paint(color), PLASTIC)
+    box(body, (0.84 * x, -0.4 * y, t), (0.97 * x, 0.4 * y, t + 0.0015), paint(color), PLASTIC)
     return np.eye(4)[None]
 
 
