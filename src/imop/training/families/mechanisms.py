@@ -93,9 +93,10 @@ class Link:
 
 def mechanism(shape: np.random.Generator, color: np.random.Generator) -> Thing:
     """A base and its links; frame: on the table, most links towards +x or upwards."""
+    count = int(shape.choice((1, 2, 3), p=(0.4, 0.4, 0.2)))
     while True:
         base, faces = _base(shape)
-        links = _links(shape, faces)
+        links = _links(shape, faces, count)
         base += [piece for link in links for piece in link.fixed]
         base += _marks(shape, faces)
         if _works(base, links):
@@ -131,23 +132,23 @@ def _hang(spec: Any, body: Any, link: Link, name: str, paint: Callable[[], Any],
 
 def _works(base: Sequence[Piece], links: Sequence[Link]) -> bool:
     """Whether nothing collides, all can be held, and the whole has no symmetry."""
+    for link in links:
+        holds = [link.motion(position) @ link.T for position in link.positions]
+        if link.T[2, 2] > 0.2 or not all(above_table(T) for T in holds):
+            return False
     still = np.concatenate([piece.points() for piece in base])
+    shown = [link.points() for link in links]
+    everything = np.concatenate([still, *shown])
     for k, link in enumerate(links):
-        others = np.concatenate([still, *(other.points() for other in links if other is not link)])
-        rest = np.concatenate([other.points() for other in links[k + 1 :]] or [np.full((1, 3), 9.0)])
-        if float(cKDTree(rest).query(link.points())[0].min()) < _APART:
+        if not fits(link.T, link.width, everything):
             return False
-        for position in link.positions:
-            M = link.motion(position)
-            if not above_table(M @ link.T) or se3.apply(M, link.points())[:, 2].min() < 0.001:
-                return False
-        if link.T[2, 2] > 0.2 or not fits(link.T, link.width, np.concatenate([others, link.points()])):
+        others = [points for other, points in enumerate(shown) if other != k]
+        if others and float(cKDTree(np.concatenate(others)).query(shown[k])[0].min()) < _APART:
             return False
-        ends = cKDTree(np.concatenate([rest, still]))
-        moved = se3.apply(link.motion(link.positions[1]), link.points())
-        if float((ends.query(moved)[0] < 0.003).mean()) > 0.25:
+        obstacles = cKDTree(np.concatenate([still, *others]))
+        moved = se3.apply(link.motion(link.positions[1]), shown[k])
+        if moved[:, 2].min() < 0.001 or float((obstacles.query(moved)[0] < 0.003).mean()) > 0.25:
             return False
-    everything = np.concatenate([still, *(link.points() for link in links)])
     return not ambiguous(everything)
 
 
@@ -200,9 +201,8 @@ def _facing(p: tuple[float, float, float], out: tuple[int, int, int]) -> FloatAr
     return se3.make(np.stack([np.cross(y, z), y, z], axis=1), p)
 
 
-def _links(rng: np.random.Generator, faces: Sequence[Face]) -> list[Link]:
-    """One to three links somewhere on the faces."""
-    count = int(rng.integers(1, 4))
+def _links(rng: np.random.Generator, faces: Sequence[Face], count: int) -> list[Link]:
+    """Links somewhere on the faces, most of several alike."""
     links: list[Link] = []
     while len(links) < count:
         T, a, b = faces[int(rng.integers(len(faces)))] if rng.random() < 0.6 else faces[0]
@@ -219,7 +219,7 @@ def _links(rng: np.random.Generator, faces: Sequence[Face]) -> list[Link]:
         link = kind(rng).moved(place @ local)
         link = replace(link, fixed=(*link.fixed, *stem))
         links.append(link)
-        if len(links) < count and rng.random() < 0.6:
+        if len(links) < count and rng.random() < 0.8:
             if rng.random() < 0.7 and abs(place[1, 3]) > 0.012:
                 links.append(link.mirrored())
             else:
@@ -354,7 +354,6 @@ def _plunger(rng: np.random.Generator) -> Link:
         T = grip(np.eye(3)[1], -_OUT, (0, 0, travel + 0.004))
         return Link((cap,), -_OUT, np.zeros(3), False, (0.0, travel), T, 0.0)
     stem = rod((0, 0, -0.04), (0, 0, 0.01), 0.005)
-    head = primitive(rng)
     high, size = rng.uniform(0.015, 0.03), rng.uniform(0.006, 0.015)
     head = slab((-r, -size, 0.008), (r, size, 0.008 + high))
     T = grip(np.eye(3)[1], -_OUT, (0, 0, high - 0.004))

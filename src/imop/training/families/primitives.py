@@ -22,6 +22,11 @@ WALL = 0.004
 _MIRROR = np.diag([1.0, -1.0, 1.0, 1.0])
 _SPACING = 0.008
 _WIDEST = 0.075
+_WAYS = np.stack([se3.euler(z=k * np.pi / 6)[:, 0] for k in range(12)])
+"""(12, 3) level directions all around."""
+
+Grip = tuple[FloatArray, FloatArray, FloatArray, float]
+"""Closing direction, approach and place (3,) of a gripper, in metres in the frame of a piece; its width."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +64,7 @@ class Piece:
         """Of what is round, at a height above its middle, metres."""
         if not self.profile:
             return float(self.half[0])
-        r, z = np.array(self.profile).T
-        return float(np.interp(height, z, r))
+        return float(np.interp(height, [z for _, z in self.profile], [r for r, _ in self.profile]))
 
     def reach(self, way: FloatArray) -> float:
         """How far it extends from its middle along the direction `way` (3,) of the body, metres."""
@@ -89,8 +93,11 @@ class Piece:
         caps = [outline[:1] * (share, 1) for share in (0.0, 0.5)]
         if self.kind != "cup":
             caps += [outline[-1:] * (share, 1) for share in (0.0, 0.5)]
-        sides = [_along(a, b) for a, b in pairwise(outline)]
-        return lathe.ring(np.concatenate([*caps, *sides]), np.linspace(0, 2 * np.pi, 12, endpoint=False))
+        turned = np.concatenate([*caps, *(_along(a, b) for a, b in pairwise(outline))])
+        ways = _WAYS[::2] if r < 0.012 else _WAYS
+        around = np.einsum("n,wi->nwi", turned[:, 0], ways)
+        around[:, :, 2] = turned[:, 1:]
+        return around.reshape(-1, 3)
 
     def _bow(self) -> FloatArray:
         """(4, 3) corners of its middle line."""
@@ -123,38 +130,34 @@ class Piece:
             lathe.solid(spec, inner, f"{name} floor", floor, color, PLASTIC, self.sides)
             lathe.shell(spec, inner, name, self.profile, WALL, color, PLASTIC, self.sides)
 
-    def grips(self) -> list[tuple[FloatArray, float]]:
-        """T_body_gripper (4, 4) and width of where two parallel fingers fit around it when it is alone."""
-        return [(self.T @ T, width) for T, width in self._grips() if width <= _WIDEST]
-
-    def _grips(self) -> Iterator[tuple[FloatArray, float]]:
+    def grips(self) -> Iterator[Grip]:
+        """Where two parallel fingers fit around it when it is alone, in its own frame."""
         axes = np.eye(3)
         _, y, z = self.half.tolist()
         if self.kind == "bow":
-            yield grip(axes[1], -axes[2], (0, 0, z - y)), 2 * y
+            yield axes[1], -axes[2], np.array((0, 0, z - y)), 2 * y
         elif self.kind in ("tub", "cup"):
             for way in (*axes[:2], *-axes[:2]):
                 wall = self.profile[-1][0] if self.kind == "cup" else float(self.half @ np.abs(way))
-                yield grip(way, -axes[2], (wall - WALL / 2) * way + (0, 0, z - 0.012)), WALL
+                yield way, -axes[2], (wall - WALL / 2) * way + (0, 0, z - 0.012), WALL
         elif self.kind == "box":
             for a, b in ((a, b) for a in range(3) for b in range(3) if a != b):
                 for way in (axes[b], -axes[b]):
                     deep = max(0.0, float(self.half[b]) - 0.02)
-                    yield grip(axes[a], -way, deep * way), 2 * float(self.half[a])
+                    yield axes[a], -way, deep * way, 2 * float(self.half[a])
         else:
             yield from self._round_grips()
 
-    def _round_grips(self) -> Iterator[tuple[FloatArray, float]]:
+    def _round_grips(self) -> Iterator[Grip]:
         along, z = np.array([0.0, 0.0, 1.0]), float(self.half[2])
-        for angle in np.arange(8) * np.pi / 4:
-            way, aside = (se3.euler(z=angle) @ axis for axis in np.eye(3)[:2])
+        for way, aside in zip(_WAYS, np.roll(_WAYS, -3, axis=0), strict=True):
             for height in (-0.5 * z, 0.0, 0.5 * z):
-                yield grip(aside, -way, (0, 0, height)), 2 * self.radius(height)
+                yield aside, -way, height * along, 2 * self.radius(height)
             if z < 0.02:
-                yield grip(along, -way, max(0.0, self.radius(0.0) - 0.015) * way), 2 * z
+                yield along, -way, max(0.0, self.radius(0.0) - 0.015) * way, 2 * z
             for sign in (-1.0, 1.0):
                 height = sign * max(0.0, z - 0.015)
-                yield grip(aside, -sign * along, (0, 0, height)), 2 * self.radius(height)
+                yield aside, -sign * along, height * along, 2 * self.radius(height)
 
 
 def mirrored(T: FloatArray) -> FloatArray:
@@ -217,25 +220,30 @@ def fits(T_body_gripper: FloatArray, width: float, points: FloatArray) -> bool:
 def holds(rng: np.random.Generator, piece: Piece, points: FloatArray) -> list[Hold]:
     """Up to two grips of a piece, some leaning, with room above the table among a whole thing's `points`."""
     found: list[Hold] = []
-    grips = piece.grips()
-    for T, width in (grips[i] for i in rng.permutation(len(grips))):
+    grips = [item for item in piece.grips() if item[3] <= _WIDEST and piece.T[2, :3] @ item[1] < 0.15]
+    for closing, approach, p, width in (grips[i] for i in rng.permutation(len(grips))[:8]):
         if len(found) == 2:
             break
-        leaning = T @ se3.make(se3.euler(y=rng.uniform(-0.7, 0.7) if rng.random() < 0.5 else 0.0))
-        if leaning[2, 2] < 0.15 and above_table(leaning) and fits(leaning, width, points):
-            found.append(Hold(leaning, width=width))
+        lean = se3.make(se3.euler(y=rng.uniform(-0.7, 0.7) if rng.random() < 0.5 else 0.0))
+        T = piece.T @ grip(closing, approach, p) @ lean
+        if T[2, 2] < 0.15 and above_table(T) and fits(T, width, points):
+            found.append(Hold(T, width=width))
     return found
 
 
 def ambiguous(points: FloatArray) -> bool:
     """Whether some turn about an axis through its middle leaves almost all of a surface where it was."""
-    some = points[np.random.default_rng(0).permutation(len(points))[:300]]
+    some = points[np.random.default_rng(0).permutation(len(points))[:200]]
     middle = points.mean(axis=0)
-    axes = [*np.eye(3), *np.linalg.svd(some - middle, full_matrices=False)[2]]
-    turns = Rotation.from_rotvec([k * np.pi / 6 * axis for axis in axes for k in range(1, 12)]).as_matrix()
-    turned = np.einsum("kij,nj->kni", turns, some - middle)
+    own = np.linalg.svd(some - middle, full_matrices=False)[2]
+    turned = np.einsum("kij,nj->kni", _turns(np.concatenate([np.eye(3), own])), some - middle)
     near = np.isfinite(cKDTree(points - middle).query(turned, distance_upper_bound=0.01)[0])
     return bool(near.mean(axis=1).max() > 0.95)
+
+
+def _turns(axes: FloatArray) -> FloatArray:
+    """(K, 3, 3) turns about axes (N, 3) by 60, 90, 120 and 180 degrees; turning back tells no more."""
+    return Rotation.from_rotvec([k * np.pi / 6 * axis for axis in axes for k in (2, 3, 4, 6)]).as_matrix()
 
 
 def palette(color: np.random.Generator) -> Callable[[], Color]:
