@@ -1,13 +1,14 @@
 """`python -m imop.training.generate`: write shards of synthetic pairs or routes; run again, it goes on."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from joblib import Parallel, delayed
 
-from imop.errors import CorruptData
-from imop.training.families import HELD_OUT, TRAINING
+from imop.errors import CorruptData, InvalidInput
+from imop.training.families import HELD_OUT, TRAINING, Family
 from imop.training.route_shards import RouteShard, write_routes
 from imop.training.routes import synthetic_routes
 from imop.training.shards import Shard, write_shard
@@ -18,7 +19,13 @@ ROUTE_SHARD = 100
 
 
 def generate(
-    out: Path, count: int, seed: int, jobs: int, held_out: bool = False, routes: bool = False
+    out: Path,
+    count: int,
+    seed: int,
+    jobs: int,
+    held_out: bool = False,
+    routes: bool = False,
+    names: Sequence[str] = (),
 ) -> None:
     """Write `count` pairs, or routes, to numbered shards in `out`; whole shards that are there stay.
 
@@ -29,21 +36,41 @@ def generate(
         jobs: worker processes.
         held_out: whether of the families for testing only.
         routes: whether examples for the routing network instead of pairs.
+        names: of the families that the scenes are made of; none for all.
+
+    Raises:
+        InvalidInput: if there is no such family.
     """
+    families = chosen(names, held_out)
     out.mkdir(parents=True, exist_ok=True)
     full = ROUTE_SHARD if routes else SHARD
     sizes = [min(full, count - start) for start in range(0, count, full)]
     Parallel(n_jobs=jobs)(
-        delayed(_shard)(out / f"shard-{i:05d}.npz", i, size, seed, held_out, routes)
+        delayed(_shard)(out / f"shard-{i:05d}.npz", size, _content(seed, i, held_out), families, routes)
         for i, size in enumerate(sizes)
     )
 
 
-def _shard(path: Path, number: int, size: int, seed: int, held_out: bool, routes: bool) -> None:
+def chosen(names: Sequence[str], held_out: bool) -> dict[str, Family]:
+    """The families of these names, in the order of the table whatever the order of the names; all for none.
+
+    Raises:
+        InvalidInput: if there is no such family.
+    """
+    every = HELD_OUT if held_out else TRAINING
+    unknown = sorted(set(names) - set(every))
+    if unknown:
+        raise InvalidInput("families", f"no {', '.join(unknown)}", ", ".join(every))
+    return {name: family for name, family in every.items() if not names or name in names}
+
+
+def _content(seed: int, number: int, held_out: bool) -> int:
+    return int(np.random.SeedSequence([seed, number, int(held_out)]).generate_state(1)[0])
+
+
+def _shard(path: Path, size: int, content: int, families: dict[str, Family], routes: bool) -> None:
     if _whole(path, size, routes):
         return
-    content = int(np.random.SeedSequence([seed, number, int(held_out)]).generate_state(1)[0])
-    families = HELD_OUT if held_out else TRAINING
     if routes:
         write_routes(list(synthetic_routes(content, size, families)), path)
     else:
@@ -70,10 +97,11 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--held-out", action="store_true", help="families for testing only")
+    parser.add_argument("--families", nargs="+", default=(), metavar="NAME", help="only these; default: all")
     args = parser.parse_args()
     routes = args.routes is not None
     count = args.routes if routes else args.pairs
-    generate(args.out, count, args.seed, args.jobs, args.held_out, routes)
+    generate(args.out, count, args.seed, args.jobs, args.held_out, routes, args.families)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,21 @@
 """Families of procedural things. The novel tasks' kinds of things are apart, for testing only."""
 
-from imop.training.families import cabinets, rings, solids, tools, vessels
+from imop.training.families import (
+    cabinets,
+    cables,
+    composites,
+    flaps,
+    household,
+    levers,
+    mechanisms,
+    pourers,
+    rings,
+    slabs,
+    solids,
+    tools,
+    toys,
+    vessels,
+)
 from imop.training.families.held_out import HELD_OUT
 from imop.training.families.thing import Family, Thing
 
@@ -31,6 +46,39 @@ TRAINING: dict[str, Family] = {
     "knob": cabinets.knob,
     "buttons": cabinets.buttons,
     "switch": cabinets.switch,
+    "latch": levers.latch,
+    "handle": levers.handle,
+    "crank": levers.crank,
+    "pump": levers.pump,
+    "valve": levers.valve,
+    "signal": levers.signal,
+    "throttle": levers.throttle,
+    "sorter": slabs.sorter,
+    "slab": slabs.slab,
+    "pile": slabs.pile,
+    "solar": flaps.solar,
+    "easel": flaps.easel,
+    "hatch": flaps.hatch,
+    "letterbox": flaps.letterbox,
+    "grille": flaps.grille,
+    "plug": cables.plug,
+    "chain": cables.chain,
+    "lamp": cables.lamp,
+    "kettle": pourers.kettle,
+    "jug": pourers.jug,
+    "iron": household.iron,
+    "handset": household.handset,
+    "torch": household.torch,
+    "scissors": household.scissors,
+    "trowel": household.trowel,
+    "funnel": household.funnel,
+    "stapler": household.stapler,
+    "furniture": toys.furniture,
+    "car": toys.car,
+    "plane": toys.plane,
+    "shoe": toys.shoe,
+    "composite": composites.composite,
+    "mechanism": mechanisms.mechanism,
 }
 """What the bundled weights learn from."""
 

@@ -1,0 +1,29 @@
+import numpy as np
+import pytest
+
+from imop.errors import InvalidInput
+from imop.training.families import HELD_OUT, TRAINING
+from imop.training.generate import chosen, generate
+from imop.training.shards import Shard
+
+
+def test_families_are_chosen_by_name_and_no_names_mean_all():
+    assert chosen((), False) == TRAINING and chosen((), True) == HELD_OUT
+    assert list(chosen(("mug", "block"), False)) == ["block", "mug"]
+
+
+@pytest.mark.parametrize("held_out", [False, True])
+def test_a_family_of_the_other_set_is_refused_and_the_accepted_ones_named(tmp_path, held_out):
+    own, other = (HELD_OUT, TRAINING) if held_out else (TRAINING, HELD_OUT)
+    with pytest.raises(InvalidInput) as refusal:
+        generate(tmp_path / "out", 1, seed=0, jobs=1, held_out=held_out, names=[next(iter(other))])
+    assert all(name in str(refusal.value) for name in own)
+    assert not (tmp_path / "out").exists()
+
+
+def test_naming_all_families_changes_nothing(tmp_path):
+    for out, names in (("all", ()), ("named", tuple(reversed(TRAINING))), ("few", ("block", "drawers"))):
+        generate(tmp_path / out, 1, seed=0, jobs=1, names=names)
+    default, named, few = (Shard(tmp_path / out / "shard-00000.npz")[0] for out in ("all", "named", "few"))
+    np.testing.assert_array_equal(default.query.points, named.query.points)
+    assert not np.array_equal(default.query.points, few.query.points)
