@@ -6,10 +6,10 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from imop.geometry import se3
+from imop.geometry.neighbours import within
 from imop.sim.parts.hinge import hinge
 from imop.sim.parts.shapes import part
 from imop.training.families.composites import primitive
@@ -143,11 +143,10 @@ def _works(base: Sequence[Piece], links: Sequence[Link]) -> bool:
         if not fits(link.T, link.width, everything):
             return False
         others = [points for other, points in enumerate(shown) if other != k]
-        if others and float(cKDTree(np.concatenate(others)).query(shown[k])[0].min()) < _APART:
+        if others and within(shown[k], np.concatenate(others), _APART).any():
             return False
-        obstacles = cKDTree(np.concatenate([still, *others]))
         moved = se3.apply(link.motion(link.positions[1]), shown[k])
-        if moved[:, 2].min() < 0.001 or float((obstacles.query(moved)[0] < 0.003).mean()) > 0.25:
+        if moved[:, 2].min() < 0.001 or within(moved, np.concatenate([still, *others]), 0.003).mean() > 0.25:
             return False
     return not ambiguous(everything)
 
