@@ -80,6 +80,6 @@ TRAINING: dict[str, Family] = {
     "composite": composites.composite,
     "mechanism": mechanisms.mechanism,
 }
-"""What the bundled weights learn from."""
+"""What one trains on: kinds of things, then random composites and mechanisms."""
 
 __all__ = ["HELD_OUT", "TRAINING", "Family", "Thing"]

@@ -112,7 +112,7 @@ def primitive(rng: np.random.Generator) -> Piece:
 
 def _turned(rng: np.random.Generator, radius: float, h: float, prism: bool) -> Piece:
     style = rng.random()
-    profile = ((radius, -h), (radius, h))
+    profile: tuple[tuple[float, float], ...] = ((radius, -h), (radius, h))
     if style < 0.3:
         profile = ((radius, -h), (radius * rng.uniform(0.2, 0.8), h))
     elif style < 0.5 and not prism:

@@ -97,7 +97,7 @@ class Piece:
         ways = _WAYS[::2] if r < 0.012 else _WAYS
         around = np.einsum("n,wi->nwi", turned[:, 0], ways)
         around[:, :, 2] = turned[:, 1:]
-        return around.reshape(-1, 3)
+        return np.asarray(around.reshape(-1, 3))
 
     def _bow(self) -> FloatArray:
         """(4, 3) corners of its middle line."""
