@@ -37,6 +37,7 @@ class SearchConfig:
 
     Attributes:
         refined: how many seeds are refined by closest points.
+        judged: how many of the refined motions, those that look best at a glance, are judged.
         finished: how many of the refined motions get the finest stage too.
         righted: how many of the best are set upright, too.
         turned: how many of the best are tried half a turn off, too: long things have two ends.
@@ -48,6 +49,7 @@ class SearchConfig:
     """
 
     refined: int = 12
+    judged: int = 10
     finished: int = 4
     righted: int = 12
     turned: int = 0
@@ -147,20 +149,31 @@ class Inquiry:
         seeds = seeds[distinct(seeds, self._center, keep=self._config.refined)]
         starts, parts = [*self._likely, *seeds], range(len(self._search.coarse))
         found = [self._judge.judge(T) for T in self._likely]
-        found += [self._refined(T, part) for part in parts for T in starts]
+        found += self._judged([self._moved(T, part) for part in parts for T in starts])
         ends = [self._half_turn(h.T_query_support) for h in _best(found, self._config.turned)]
-        found = _best(found + [self._refined(T, part) for part in parts for T in ends])
-        # Many seeds end in the same place.
-        motions = np.stack([hypothesis.T_query_support for hypothesis in found])
-        found = [found[i] for i in distinct(motions, self._center, len(found), *SAME_MOTION)]
+        found = _best(found + self._judged([self._moved(T, part) for part in parts for T in ends]))
         # The last half millimetre is worth looking for only where it matters.
         found = _best(found + [self._finished(h.T_query_support) for h in found[: self._config.finished]])
         return self._ordered(
             found + [self._upright(h.T_query_support) for h in found[: self._config.righted]]
         )
 
-    def _refined(self, T: FloatArray, part: int = -1) -> Hypothesis:
-        return self._judge.judge(self._refine(self._search.coarse[part], T))
+    def _judged(self, motions: list[FloatArray]) -> list[Hypothesis]:
+        """The best at a glance of different motions; many seeds end in the same place."""
+        if not motions:
+            return []
+        ranked = np.stack(motions)
+        ranked = ranked[np.argsort(-self._judge.glance(ranked), kind="stable")]
+        return [
+            self._judge.judge(ranked[i])
+            for i in distinct(ranked, self._center, self._config.judged, *SAME_MOTION)
+        ]
+
+    def _moved(self, T: FloatArray, part: int = -1) -> FloatArray:
+        return self._refine(self._search.coarse[part], T)
+
+    def _refined(self, T: FloatArray) -> Hypothesis:
+        return self._judge.judge(self._moved(T))
 
     def _finished(self, T: FloatArray) -> Hypothesis:
         return self._judge.judge(self._refine(self._search.fine, T, FINEST))
