@@ -129,6 +129,19 @@ def test_eval_writes_the_same_table_as_json_and_markdown(tmp_path, capsys):
     assert "lid_off_pot" in (tmp_path / "report.md").read_text()
 
 
+def test_eval_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
+    arguments = ("eval", "--methods", "replay", "--tasks", "lid_off_pot", "--jobs", 1, "--out", tmp_path)
+    assert imop(*arguments, "--episodes", 1) == 0
+    before = (tmp_path / "episodes.jsonl").read_text()
+
+    def nothing_to_try(trial):
+        raise AssertionError(f"{trial} was tried again")
+
+    monkeypatch.setattr(Trial, "env", nothing_to_try)
+    assert imop(*arguments, "--episodes", 1) == 0
+    assert (tmp_path / "episodes.jsonl").read_text() == before
+
+
 def test_model_counts_what_the_paper_counts(capsys):
     assert imop("model", "--config", "paper") == 0
     out = capsys.readouterr().out

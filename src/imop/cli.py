@@ -127,13 +127,16 @@ def evaluate(
 ) -> int:
     """Success rates of several methods on the same demonstrations and scenes.
 
-    Prints the table and writes results.json and report.md.
+    Prints the table and writes results.json and report.md. Every episode is kept in episodes.jsonl, with the
+    reason why it ended: run again, the same command goes on where it was stopped, and what was tried with
+    the same code and weights is not tried again.
 
     Args:
         suite: which suite.
         split: base, novel, cross_object or all.
         tasks: names within the split; all if none is given.
-        methods: any of replay, registration, learned, oracle (true object poses), expert, joined by commas.
+        methods: any of replay, registration, learned, routed (learned, and the routing network may go back
+            to a step), oracle (true object poses), expert, joined by commas.
         episodes: scenes per task, spread over its variations.
         seed: first seed of the scenes.
         instance: seed of the objects' shapes, sizes and colours.
@@ -143,8 +146,9 @@ def evaluate(
     """
     from imop.evaluation.benchmark import evaluate_suite
 
+    log = out / "episodes.jsonl"
     results = evaluate_suite(
-        suite, split, tasks, methods.split(","), episodes, seed, instance, jobs, console, weights
+        suite, split, tasks, methods.split(","), episodes, seed, instance, jobs, console, weights, log
     )
     results.save(out)
     console.print(results.table())

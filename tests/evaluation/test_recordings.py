@@ -34,10 +34,10 @@ def test_scenes_are_recorded_once(tmp_path, monkeypatch):
 
 
 def test_other_code_records_again(tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "_state_of_the_code", lambda: "old")
+    monkeypatch.setattr(module, "code_digest", lambda *packages: "old")
     monkeypatch.setattr(module, "record_demonstration", lambda *_: fails())
     assert Recordings(tmp_path).scene(POT) is None
-    monkeypatch.setattr(module, "_state_of_the_code", lambda: "new")
+    monkeypatch.setattr(module, "code_digest", lambda *packages: "new")
     monkeypatch.setattr(module, "record_demonstration", never)
     with pytest.raises(AssertionError):
         Recordings(tmp_path).scene(POT)

@@ -1,7 +1,8 @@
 """Success rates of several methods on the same demonstrations and scenes."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from joblib import Parallel, delayed
@@ -9,10 +10,11 @@ from rich.console import Console
 from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from imop.errors import ImopError, InvalidInput
+from imop.evaluation.episodes import Episode, EpisodeLog, method_state
 from imop.evaluation.report import Count, Results
 from imop.evaluation.rollout import rollout
 from imop.evaluation.trials import Trial, demonstration_for, make_policy, most_actions, suite_trials
-from imop.tasks.expert import ExpertFailed, perform
+from imop.tasks.expert import perform
 from imop.tasks.layout import NoRoom
 from imop.types import Demonstration
 
@@ -40,22 +42,49 @@ def evaluate_suite(
     jobs: int,
     console: Console,
     weights: Path | None = None,
+    log: Path | None = None,
 ) -> Results:
     """Try every method in the same `episodes` scenes of every task.
 
+    Args:
+        suite: which suite.
+        split: which of its tasks.
+        tasks: only these; all if empty.
+        methods: names of `METHODS`.
+        episodes: scenes per task.
+        seed: of the first scene.
+        instance: of the objects.
+        jobs: processes.
+        console: for the progress.
+        weights: of the learned policy; None for the bundled ones.
+        log: file of episodes; what is in it is not tried again.
+
     Raises:
         InvalidInput: for an unknown suite, split, task or method.
+        CorruptData: if the log cannot be read.
     """
     if unknown := [method for method in methods if method not in METHODS]:
         raise InvalidInput("methods", unknown[0], ", ".join(METHODS))
     trials = suite_trials(suite, split, tasks, episodes, seed, instance)
-    every = [trial for of_task in trials.values() for trial in of_task]
-    shown = _demonstrations(every, jobs, console)
-    work = [delayed(outcomes)(trial, shown[_shared(trial)], methods, weights) for trial in every]
-    results = dict(zip(every, parallel(work, jobs, console, "episodes"), strict=True))
+    states = {method: method_state(method, weights) for method in methods}
+    with TemporaryDirectory() as folder:
+        known = EpisodeLog(log or Path(folder) / "episodes.jsonl")
+        missing = [
+            (trial, method)
+            for trial in (trial for of_task in trials.values() for trial in of_task)
+            for method in methods
+            if known.find(trial, method, states[method]) is None
+        ]
+        shown = _demonstrations([trial for trial, _ in missing], jobs, console)
+        work = [
+            delayed(attempt)(trial, shown[_shared(trial)], method, states[method], weights)
+            for trial, method in missing
+        ]
+        for episode in parallel(work, jobs, console, "episodes"):
+            known.add(episode)
     counts = {
         method: {
-            task: _count([results[trial][method] for trial in of_task if results[trial]])
+            task: _count([known.find(trial, method, states[method]) for trial in of_task])
             for task, of_task in trials.items()
         }
         for method in methods
@@ -63,35 +92,29 @@ def evaluate_suite(
     return Results(suite, ",".join(tasks) or split, seed, counts, NOTES)
 
 
-def outcomes(
-    trial: Trial, demonstration: Demonstration, methods: Iterable[str], weights: Path | None = None
-) -> dict[str, bool]:
-    """Success of each method in one scene; empty if the objects of the scene find no place."""
+def attempt(
+    trial: Trial, demonstration: Demonstration, method: str, state: str, weights: Path | None = None
+) -> Episode:
+    """How a method that was shown the demonstration does in one scene."""
     try:
-        return {method: _succeeds(trial, demonstration, method, weights) for method in methods}
-    except NoRoom:
-        return {}
-
-
-def _succeeds(trial: Trial, demonstration: Demonstration, method: str, weights: Path | None) -> bool:
-    env = trial.env()
-    if method == "expert":
-        try:
+        env = trial.env()
+        if method == "expert":
             perform(env.task, env.world)
-        except ExpertFailed:
-            return False
-        return True
-    policy = make_policy(method, env.world, weights=weights)
-    try:
+            return Episode(trial, method, state, True, "success", len(demonstration))
+        policy = make_policy(method, env.world, weights=weights)
         policy.watch(demonstration if method == "oracle" else demonstration.stripped())
-        return rollout(env, policy, most_actions(method, demonstration, env.task)).success
-    except ImopError:
+        result = rollout(env, policy, most_actions(method, demonstration, env.task))
+    except NoRoom as error:
+        return Episode(trial, method, state, None, str(error))
+    except ImopError as error:
         # What a policy cannot handle it has failed at; the other methods and scenes go on.
-        return False
+        return Episode(trial, method, state, False, str(error))
+    return Episode(trial, method, state, result.success, result.reason, len(result.steps))
 
 
-def _count(successes: list[bool]) -> Count:
-    return Count(sum(successes), len(successes))
+def _count(episodes: list[Episode | None]) -> Count:
+    tried = [episode.success for episode in episodes if episode and episode.success is not None]
+    return Count(sum(tried), len(tried))
 
 
 def _shared(trial: Trial) -> tuple[str, int, int]:

@@ -1,6 +1,5 @@
 """Demonstrations of the expert that are recorded once and kept in a folder."""
 
-import hashlib
 import json
 from dataclasses import asdict
 from pathlib import Path
@@ -11,6 +10,7 @@ import imop.sim
 import imop.tasks
 from imop.demos.store import DemonstrationStore
 from imop.errors import InvalidInput
+from imop.evaluation.fingerprint import code_digest
 from imop.evaluation.trials import DEMONSTRATION_SEED, Trial, demonstration_for
 from imop.files import replaced
 from imop.sim.world import World, scene_spec
@@ -30,7 +30,7 @@ class Recordings:
     """
 
     def __init__(self, folder: Path):
-        path = folder / f"recordings-{_state_of_the_code()}"
+        path = folder / f"recordings-{code_digest(imop.sim, imop.tasks)}"
         self._failed = path / "failed"
         try:
             self._store = DemonstrationStore.open(path / "demos.zarr")
@@ -83,13 +83,3 @@ def objects_world(trial: Trial) -> World:
     task, spec = make_task(trial.task), scene_spec()
     task.build(spec, trial.variation, np.random.default_rng((trial.instance, trial.variation)))
     return World(spec)
-
-
-def _state_of_the_code() -> str:
-    """Short digest of everything that decides what is recorded."""
-    digest = hashlib.sha256()
-    for package in (imop.sim, imop.tasks):
-        for folder in package.__path__:
-            for file in sorted(Path(folder).rglob("*.py")):
-                digest.update(file.read_bytes())
-    return digest.hexdigest()[:12]

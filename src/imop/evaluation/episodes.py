@@ -1,0 +1,96 @@
+"""Episodes that were tried, one line each in a file: a benchmark that is stopped goes on where it was."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import dacite
+
+import imop.demos
+import imop.geometry
+import imop.networks
+import imop.policy
+import imop.sim
+import imop.tasks
+from imop.errors import CorruptData
+from imop.evaluation.fingerprint import code_digest, weights_digest
+from imop.evaluation.trials import Trial
+from imop.networks.model import BUNDLED
+
+
+@dataclass(frozen=True)
+class Episode:
+    """How one method did in one scene.
+
+    Attributes:
+        trial: the scene.
+        method: its name.
+        state: of code and weights, see `method_state`.
+        success: whether the task was done; None if the objects of the scene found no place.
+        reason: why the episode ended.
+        actions: how many were taken.
+    """
+
+    trial: Trial
+    method: str
+    state: str
+    success: bool | None
+    reason: str
+    actions: int = 0
+
+
+class EpisodeLog:
+    """A file of episodes, read when opened and appended to.
+
+    Args:
+        path: the file, made when the first episode is added.
+
+    Raises:
+        CorruptData: if a line other than an unfinished last one cannot be read.
+    """
+
+    def __init__(self, path: Path):
+        self._path = path
+        self._episodes = {(e.trial, e.method, e.state): e for e in _read(path)}
+
+    def find(self, trial: Trial, method: str, state: str) -> Episode | None:
+        """The episode, or None if it was not tried in this state."""
+        return self._episodes.get((trial, method, state))
+
+    def add(self, episode: Episode) -> None:
+        """Keep a further episode."""
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        with self._path.open("a") as file:
+            file.write(json.dumps(asdict(episode)) + "\n")
+        self._episodes[episode.trial, episode.method, episode.state] = episode
+
+
+def method_state(method: str, weights: Path | None) -> str:
+    """Digest of the code that decides how a method does, and of its weights if it has some."""
+    world = code_digest(imop.sim, imop.tasks, imop.geometry)
+    if method in ("expert", "oracle", "replay"):
+        return world
+    policy = code_digest(imop.policy, imop.networks, imop.demos)
+    learned = method in ("learned", "routed")
+    return "-".join([world, policy, *([weights_digest(weights or BUNDLED)] if learned else [])])
+
+
+def _read(path: Path) -> Iterator[Episode]:
+    if not path.is_file():
+        return
+    text = path.read_bytes()
+    whole = text[: text.rfind(b"\n") + 1]
+    if len(whole) < len(text):
+        # Stopped in the middle of a line: what follows must begin on a new one.
+        with path.open("r+b") as file:
+            file.truncate(len(whole))
+    for number, line in enumerate(whole.splitlines(), start=1):
+        try:
+            fields = json.loads(line)
+            if not isinstance(fields, dict):
+                raise TypeError("not an object")
+            yield dacite.from_dict(Episode, fields, dacite.Config(strict=True))
+        except (ValueError, TypeError, dacite.DaciteError) as error:
+            problem = f"line {number} is no episode ({error})"
+            raise CorruptData(path, problem, "lines as `imop eval` writes them") from error
