@@ -45,6 +45,9 @@ class Task(ABC):
     def furnish(self, spec: Any, rng: np.random.Generator) -> None:  # noqa: B027 (optional)
         """Add what differs from scene to scene and the task does not need; nothing by default."""
 
+    def prepare(self, world: World) -> None:  # noqa: B027 (optional)
+        """Say of the compiled scene what its bodies do not, such as what is one thing; nothing by default."""
+
     @abstractmethod
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Place everything at random so that the expert can begin.
@@ -97,5 +100,6 @@ def make_scene(task: Task, variation: int, instance_seed: int, seed: int) -> Wor
     for body in task.graspable:
         allow_grasp(spec, body)
     world = World(spec)
+    task.prepare(world)
     task.reset(world, np.random.default_rng((seed, 2)))
     return world

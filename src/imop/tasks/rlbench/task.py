@@ -136,6 +136,9 @@ class RLBenchTask(Task):
         for geom in spec.body("table").geoms:
             geom.friction[0] = self.table_friction
 
+    def prepare(self, world: World) -> None:
+        separate(world, self.model)
+
     def init_episode(self, scene: Scene, rng: np.random.Generator) -> None:
         """Arrange the variation's scene, before the task is placed as a whole; nothing by default.
 
@@ -149,7 +152,6 @@ class RLBenchTask(Task):
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
         scene = Scene(world, self.model)
-        separate(world, self.model)
         world.unavoided = unavoided(world, self.model)
         for name in self.loose:
             first, body = int(world.model.joint(name).dofadr[0]), world.model.body(name)
