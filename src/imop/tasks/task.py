@@ -7,9 +7,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from imop.errors import InvalidInput
-from imop.sim.gripper import OnFrame
+from imop.sim.gripper import PERIOD_STEPS, OnFrame
 from imop.sim.world import World, allow_grasp, scene_spec
 from imop.tasks.waypoint import Waypoint
+
+_EXTRA_PERIODS = 10
+"""Of 0.05 simulated seconds."""
 
 
 class Task(ABC):
@@ -77,6 +80,16 @@ def watching(task: Task, on_frame: OnFrame | None) -> OnFrame:
             on_frame(world)
 
     return watch
+
+
+def wait(task: Task, world: World, watch: OnFrame) -> bool:
+    """Let go on what rolls or falls after the last step, as RLBench does; whether the aim is reached."""
+    for _ in range(_EXTRA_PERIODS):
+        if task.success(world):
+            return True
+        world.step(PERIOD_STEPS)
+        watch(world)
+    return task.success(world)
 
 
 def make_scene(task: Task, variation: int, instance_seed: int, seed: int) -> World:

@@ -37,14 +37,14 @@ def test_every_variation_has_words_of_its_own(name):
 @pytest.fixture(scope="module", params=PRESENT)
 def untouched(request, tmp_path_factory):
     """A task and its first draw of a scene, whether or not the arm could work there: choosing takes long."""
-    name = request.param
-    provided = provide(tmp_path_factory.mktemp("cache"), [name])
+    provided = provide(tmp_path_factory.mktemp("cache"), [request.param])
     next(provided)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(RLBenchTask, "_problem", lambda task, world: "")
-        task = make_task(f"rlbench/{name}")
-        yield task, make_scene(task, 0, 0, 0)
-    next(provided, None)
+        task = make_task(f"rlbench/{request.param}")
+        world = make_scene(task, 0, 0, 0)
+    provided.close()
+    return task, world
 
 
 def test_an_untouched_scene_is_no_success(untouched):
