@@ -26,6 +26,7 @@ from rich.table import Table
 
 from imop.evaluation.statistics import wilson
 from imop.geometry import se3
+from imop.geometry.accuracy import COARSE, FINE, errors
 from imop.geometry.cloud import PointCloud
 from imop.geometry.neighbours import within
 from imop.geometry.perception import Perception
@@ -122,26 +123,19 @@ def predict(
         seconds = time.perf_counter() - started
         hints = [found[0].T_query_support] if found else []
         T = found[0].T_query_support if found else np.eye(4)
-        errors = nearest_right(T, pair)
+        goal = pair.T_world_goal
+        position, rotation = errors(T @ goal, pair.T_query_support @ goal)
         truth = shown.clouds[k].points[pair.region]
         yield Row(
             method,
             number,
             k,
-            *errors,
+            position,
+            float(np.degrees(rotation)),
             iou(prepared[k].region, truth),
             found[0].score if found else 0,
             seconds,
         )
-
-
-def nearest_right(T: FloatArray, pair: StepPair) -> tuple[float, float]:
-    """Metres and degrees to the right pose that is nearest, 2 cm being worth 10 degrees."""
-    right, found = pair.T_query_support @ pair.T_world_goal, T @ pair.T_world_goal
-    position = se3.translation_distance(right, found)
-    rotation = np.degrees(se3.rotation_distance(right, found))
-    best = int(np.argmin(np.maximum(position / 0.02, rotation / 10)))
-    return float(position[best]), float(rotation[best])
 
 
 def with_every_turn(scene: Scene, shown: Take, k: int, pair: StepPair) -> StepPair:
@@ -182,7 +176,7 @@ def scene_rows(number: int, seed: int, methods: tuple[str, ...], weights: Path) 
 
 def summary(rows: list[Row]) -> dict[str, object]:
     position, rotation = (np.array([getattr(row, name) for row in rows]) for name in ("position", "rotation"))
-    fine, coarse = (position < 0.01) & (rotation < 5), (position < 0.02) & (rotation < 10)
+    fine, coarse = ((position < metres) & (rotation < degrees) for metres, degrees in (FINE, COARSE))
     return {
         "n": len(rows),
         "scenes": len({row.scene for row in rows}),

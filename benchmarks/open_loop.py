@@ -30,13 +30,14 @@ from imop.errors import ImopError, InvalidInput
 from imop.evaluation.appearance import Appearance
 from imop.evaluation.benchmark import parallel
 from imop.evaluation.open_loop import Case, RecordedPoses, ask
-from imop.evaluation.open_loop_rows import COARSE, Row, by_task
+from imop.evaluation.open_loop_rows import Row, by_task
 from imop.evaluation.oracle import OraclePolicy
 from imop.evaluation.picture import Panel, save_picture
 from imop.evaluation.recordings import Recordings, objects_world
 from imop.evaluation.rollout import Policy
 from imop.evaluation.trials import Trial, make_policy, suite_trials
 from imop.files import replaced, user_cache
+from imop.geometry.accuracy import COARSE
 from imop.tasks.expert import ExpertFailed
 from imop.tasks.layout import NoRoom
 from imop.types import Action

@@ -16,6 +16,14 @@ torch.set_num_threads(1)
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 
+def shared(name: str) -> Path:
+    """A folder of the shared data; the test is skipped where it is missing."""
+    path = SHARED / "data" / name
+    if not path.is_dir():
+        pytest.skip(f"{name} may not be redistributed; looked for {path}")
+    return path
+
+
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(0)
@@ -24,7 +32,4 @@ def rng() -> np.random.Generator:
 @pytest.fixture(scope="session")
 def rlbench_demos() -> Path:
     """Folder of real RLBench demonstrations, which may not be redistributed."""
-    path = SHARED / "data" / "rlbench_demos"
-    if not path.is_dir():
-        pytest.skip(f"real RLBench demonstrations may not be redistributed; looked for {path}")
-    return path
+    return shared("rlbench_demos")

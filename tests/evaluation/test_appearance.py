@@ -70,11 +70,37 @@ def test_turns_that_cannot_be_seen(appearance, name, turns):
     assert np.allclose(found[:, 2, 2], 1) and np.allclose(found[:, :3, 3], 0)
 
 
+def test_the_upright_axis_counts_whatever_its_name():
+    spec = scene_spec()
+    body = spec.worldbody.add_body(name="pot", pos=[0.3, 0, 0.8], quat=[0.5**0.5, 0, 0.5**0.5, 0])
+    quat = [0.5**0.5, 0, 0.5**0.5, 0]
+    body.add_geom(type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[0.04, 0.05, 0], quat=quat, rgba=[*RED, 1])
+    turns = Appearance(World(spec)).turns("pot")
+    assert len(turns) == FINE_TURNS and np.allclose(turns[:, 0, 0], 1)
+
+
 def test_objects_are_alike_in_shape_and_color(appearance):
     assert appearance.alike("cube/body", "same_cube/body")
     for other in ("blue_cube/body", "larger_cube/body", "block/body", "can/body"):
         assert not appearance.alike("cube/body", other)
         assert not appearance.alike(other, "cube/body")
+
+
+def test_what_hangs_on_the_same_unseen_base_is_judged_alone():
+    spec = scene_spec()
+    base = spec.worldbody.add_body(name="base")
+    for name, x in (("pot", 0.3), ("cube", 0.5)):
+        body = base.add_body(name=name, pos=[x, 0, 0.8])
+        kind = mujoco.mjtGeom.mjGEOM_CYLINDER if name == "pot" else mujoco.mjtGeom.mjGEOM_BOX
+        body.add_geom(type=kind, size=[0.04, 0.04, 0.04], rgba=[*RED, 1])
+    world = World(spec)
+    assert len(Appearance(world).turns("pot")) == 1
+    for name in ("pot", "cube"):
+        number = world.model.body(name).id
+        world.instances[number], world.instance_names[number] = number, name
+    assert len(Appearance(world).turns("pot")) == FINE_TURNS
+    assert len(Appearance(world).turns("cube")) == 4
+    assert Appearance(world).instance("pot") == "pot"
 
 
 def test_a_body_that_cannot_be_seen_resembles_nothing(appearance):

@@ -3,8 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imop.evaluation.equal_poses import equal_poses, errors, held
+from imop.evaluation.equal_poses import equal_poses, held
 from imop.geometry import se3
+from imop.geometry.accuracy import errors
 from imop.types import Action, Demonstration, Keyframe, Observation
 from tests.policy.scenes import camera
 

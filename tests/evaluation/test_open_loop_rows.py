@@ -1,6 +1,7 @@
 import pytest
 
-from imop.evaluation.open_loop_rows import COARSE, FINE, Row, by_task, summary
+from imop.evaluation.open_loop_rows import Row, by_task, summary
+from imop.geometry.accuracy import COARSE, FINE
 
 
 def row(step=0, task="a", **fields):

@@ -1,3 +1,4 @@
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given
@@ -46,11 +47,25 @@ def test_quaternions_are_xyzw():
     np.testing.assert_allclose(T[:3, :3], se3.euler(z=0.5), atol=1e-12)
 
 
+@given(poses())
+def test_mujoco_reads_its_quaternions(T):
+    quaternion, R = se3.to_wxyz(T), np.empty(9)
+    mujoco.mju_quat2Mat(R, quaternion)
+    np.testing.assert_allclose(R.reshape(3, 3), T[:3, :3], atol=1e-12)
+    np.testing.assert_allclose(se3.from_wxyz(-2 * quaternion), T[:3, :3], atol=1e-12)
+    np.testing.assert_array_equal(quaternion[[1, 2, 3, 0]], se3.to_pose7(T)[3:])
+
+
 def test_batches(rng):
     T = se3.from_pose7(np.concatenate([rng.normal(size=(2, 5, 3)), np.tile([0, 0, 0, 1.0], (2, 5, 1))], -1))
     assert T.shape == (2, 5, 4, 4)
     assert se3.to_pose7(se3.invert(T)).shape == (2, 5, 7)
     assert se3.apply(T, rng.normal(size=(2, 5, 6, 3))).shape == (2, 5, 6, 3)
+    assert (
+        se3.from_wxyz(se3.to_wxyz(T)).shape
+        == se3.from_wxyz(se3.to_wxyz(T[..., :3, :3])).shape
+        == (2, 5, 3, 3)
+    )
     assert se3.rotation_distance(T, T).shape == (2, 5)
 
 

@@ -1,7 +1,7 @@
 """Which turns of an object cannot be seen, and which objects look the same; read from the simulated shapes.
 
-Symmetries are measured, not declared: the surface of an object is turned about the z axis of its frame and
-compared with itself, colours included. Things that are joined (a lever on its faucet) are judged whole.
+Symmetries are measured, not declared: the surface of an object is turned about the upright axis of its frame
+and compared with itself, colours included. Things that are joined (a lever on its faucet) are judged whole.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ FINE_TURNS = 360
 """Turns that stand for all turns of a surface of revolution."""
 ORDERS = (8, 6, 5, 4, 3, 2)
 _POINTS, _PROBES = 60_000, 6_000
-_STRAY = 0.001
+_STRAY = 0.003
 """Share of points that may lie off the other surface: of so many random points, some have no neighbour."""
 
 
@@ -35,15 +35,15 @@ class _Surface:
     colors: FloatArray
     spacing: float
 
-    def turned(self, angle: float) -> "_Surface":
-        return _Surface(self.points @ se3.euler(z=angle).T, self.colors, self.spacing)
+    def turned(self, angle: float, axis: int) -> "_Surface":
+        return _Surface(self.points @ _turn(angle, axis).T, self.colors, self.spacing)
 
 
 class Appearance:
     """What the bodies of a scene look like.
 
     Args:
-        world: the bodies, in any pose; joints stand where they do in all questions.
+        world: the bodies, upright; joints stand where they do in all questions.
     """
 
     def __init__(self, world: World):
@@ -57,26 +57,42 @@ class Appearance:
         return name
 
     def _turns(self, body: str) -> FloatArray:
-        """(S, 4, 4) turns of the body's frame about its z axis that cannot be seen, the identity first."""
-        model = self._world.model
-        surface = self._surface(body, model.body_rootid == model.body_rootid[model.body(body).id])
+        """(S, 4, 4) turns of the frame about its upright axis that cannot be seen, the identity first."""
+        surface = self._surface(body, self._whole(body))
+        axis = int(np.argmax(np.abs(self._world.pose(body)[2, :3])))
         # One radian is no fraction of a full turn: what it maps onto itself, any turn does.
-        if _lies_on(surface.turned(1.0), surface):
-            return _all_turns(FINE_TURNS)
-        orders = (n for n in ORDERS if _lies_on(surface.turned(2 * np.pi / n), surface))
-        return _all_turns(next(orders, 1))
+        if _lies_on(surface.turned(1.0, axis), surface):
+            return _all_turns(FINE_TURNS, axis)
+        orders = (n for n in ORDERS if _lies_on(surface.turned(2 * np.pi / n, axis), surface))
+        return _all_turns(next(orders, 1), axis)
 
     def _alike(self, body: str, other: str) -> bool:
-        """Whether two bodies have the same shape and colours in their frames."""
-        numbers = np.arange(self._world.model.nbody)
-        here, there = (self._surface(b, numbers == self._world.model.body(b).id) for b in (body, other))
+        """Whether two bodies, each with what is one instance with it, look the same in their frames."""
+        model, instances = self._world.model, self._world.instances
+        here, there = (self._surface(b, instances == instances[model.body(b).id]) for b in (body, other))
         return _lies_on(here, there) and _lies_on(there, here)
+
+    def _whole(self, body: str) -> BoolArray:
+        """(bodies,) which of them are joined with a body, but for what only hangs on the same unseen base."""
+        model, instances = self._world.model, self._world.instances
+        drawn = model.geom_bodyid[self._visible()]
+        seen, parents = np.unique(instances[drawn]), model.body_parentid
+        top = int(model.body(body).id)
+        while parents[top] and instances[parents[top]] in seen:
+            top = int(parents[top])
+        whole = np.arange(model.nbody) == top
+        for number in range(top + 1, model.nbody):
+            whole[number] |= whole[parents[number]]
+        return np.asarray(whole)
+
+    def _visible(self) -> BoolArray:
+        model = self._world.model
+        return np.asarray((model.geom_rgba[:, 3] > 0) & (model.geom_group < 3))
 
     def _surface(self, body: str, bodies: BoolArray) -> _Surface:
         """What can be seen of some bodies (a mask), in the frame of `body`."""
         model, data = self._world.model, self._world.data
-        visible = (model.geom_rgba[:, 3] > 0) & (model.geom_group < 3)
-        geoms = np.flatnonzero(bodies[model.geom_bodyid] & visible)
+        geoms = np.flatnonzero(bodies[model.geom_bodyid] & self._visible())
         rng = np.random.default_rng(0)
         triangles = [_triangles(model, int(geom)) for geom in geoms]
         areas = [float(_areas(t).sum()) for t in triangles]
@@ -91,8 +107,12 @@ class Appearance:
         return _Surface(se3.apply(T_body_world, np.concatenate(points)), np.concatenate(colors), spacing)
 
 
-def _all_turns(order: int) -> FloatArray:
-    return np.stack([se3.make(se3.euler(z=2 * np.pi * k / order)) for k in range(order)])
+def _turn(angle: float, axis: int) -> FloatArray:
+    return se3.euler(**{"xyz"[axis]: angle})
+
+
+def _all_turns(order: int, axis: int) -> FloatArray:
+    return np.stack([se3.make(_turn(2 * np.pi * k / order, axis)) for k in range(order)])
 
 
 def _lies_on(surface: _Surface, other: _Surface) -> bool:

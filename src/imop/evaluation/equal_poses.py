@@ -1,6 +1,7 @@
 """Which gripper poses are as right as the recorded one.
 
-A prediction is compared with the nearest pose of a set. Besides the recorded pose it contains:
+A prediction is compared with the nearest pose of a set (`geometry/accuracy.py`), which contains besides the
+recorded pose:
 
 - Turns of the object that the step is fixed to, where they cannot be seen (`appearance`): a knob may be
   approached from any side.
@@ -21,8 +22,6 @@ from imop.evaluation.appearance import Appearance
 from imop.geometry import se3
 from imop.types import Demonstration, FloatArray
 
-NEAR = (0.01, np.radians(5.0))
-"""Metres and radians that weigh the same when the nearest pose is chosen."""
 EMPTY = 0.02
 """Below this opening closed fingers hold nothing."""
 
@@ -48,16 +47,6 @@ def equal_poses(recorded: Demonstration, step: int, appearance: Appearance | Non
         T_world_other @ se3.invert(T_world_object) for T_world_other in _equals(recorded, step, appearance)
     ]
     return np.concatenate([T_world_gripper, *(T @ T_world_gripper for T in others)])
-
-
-def errors(T_world_gripper: FloatArray, right: FloatArray) -> tuple[float, float]:
-    """Metres and radians between a pose (4, 4) and the nearest of `right` (N, 4, 4)."""
-    metres = se3.translation_distance(T_world_gripper, right)
-    radians = se3.rotation_distance(T_world_gripper, right)
-    off = np.stack([metres / NEAR[0], radians / NEAR[1]])
-    # The sum decides among poses whose larger error is the same.
-    best = int(np.argmin(off.max(axis=0) + 1e-3 * off.sum(axis=0)))
-    return float(metres[best]), float(radians[best])
 
 
 def held(recorded: Demonstration, step: int) -> int | None:

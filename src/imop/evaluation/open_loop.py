@@ -12,12 +12,13 @@ import numpy as np
 
 from imop.errors import NoConfidentMatch
 from imop.evaluation.appearance import Appearance
-from imop.evaluation.equal_poses import equal_poses, errors
-from imop.evaluation.open_loop_rows import COARSE, Row
+from imop.evaluation.equal_poses import equal_poses
+from imop.evaluation.open_loop_rows import Row
 from imop.evaluation.oracle import OraclePolicy
 from imop.evaluation.rollout import Policy
 from imop.geometry import cloud as clouds
 from imop.geometry import se3
+from imop.geometry.accuracy import COARSE, FINE, errors
 from imop.geometry.neighbours import nearest, within
 from imop.geometry.perception import WORKSPACE_LOWER, WORKSPACE_UPPER
 from imop.policy.matcher import Scene, Transition
@@ -52,7 +53,7 @@ class Prediction:
     @property
     def within_1cm_5deg(self) -> bool:
         """Whether the prediction is near enough for most grasps."""
-        return self.position_error < 0.01 and self.rotation_error < 0.0872665
+        return bool(self.position_error < FINE[0] and self.rotation_error < np.radians(FINE[1]))
 
 
 def predict(policy: Policy, recorded: Demonstration) -> list[Prediction]:

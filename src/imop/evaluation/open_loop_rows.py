@@ -7,9 +7,7 @@ from typing import Any
 import numpy as np
 
 from imop.evaluation.statistics import wilson
-
-FINE, COARSE = (0.01, 5.0), (0.02, 10.0)
-"""Metres and degrees that a prediction has to stay below."""
+from imop.geometry.accuracy import COARSE, FINE
 
 
 @dataclass(frozen=True)

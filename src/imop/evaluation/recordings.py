@@ -82,4 +82,6 @@ def objects_world(trial: Trial) -> World:
     """The objects of the trial's task alone, not placed."""
     task, spec = make_task(trial.task), scene_spec()
     task.build(spec, trial.variation, np.random.default_rng((trial.instance, trial.variation)))
-    return World(spec)
+    world = World(spec)
+    task.prepare(world)
+    return world

@@ -108,4 +108,6 @@ def rollout(
             return Rollout(False, f"no motion ({info['plan_failed']})", tuple(taken))
         if terminated or truncated:
             break
+    if taken and env.wait():
+        return Rollout(True, "success", tuple(taken))
     return Rollout(False, "task not done after the last action", tuple(taken))

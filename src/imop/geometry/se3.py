@@ -1,4 +1,4 @@
-"""Rigid motions as (..., 4, 4) matrices, any batch dimensions; quaternions xyzw."""
+"""Rigid motions as (..., 4, 4) matrices, any batch dimensions; quaternions xyzw but for MuJoCo's."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -57,6 +57,20 @@ def to_pose7(T: FloatArray) -> FloatArray:
     """(..., 4, 4) -> (..., 7) position and quaternion xyzw with w >= 0."""
     quaternions = Rotation.from_matrix(T[..., :3, :3].reshape(-1, 3, 3)).as_quat(canonical=True)
     return np.concatenate([T[..., :3, 3], quaternions.reshape(*T.shape[:-2], 4)], axis=-1)
+
+
+def to_wxyz(T: FloatArray) -> FloatArray:
+    """Rotations (..., 3, 3), or those of poses (..., 4, 4) -> (..., 4) in MuJoCo's order, with w >= 0."""
+    R = T[..., :3, :3]
+    quaternions = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(canonical=True, scalar_first=True)
+    return np.asarray(quaternions.reshape(*T.shape[:-2], 4))
+
+
+def from_wxyz(quaternion: FloatArray) -> FloatArray:
+    """(..., 4) quaternions of any length in MuJoCo's order -> (..., 3, 3)."""
+    quaternion = np.asarray(quaternion, dtype=np.float64)
+    R = Rotation.from_quat(quaternion.reshape(-1, 4), scalar_first=True).as_matrix()
+    return np.asarray(R.reshape(*quaternion.shape[:-1], 3, 3))
 
 
 def rotation_distance(T_a: FloatArray, T_b: FloatArray) -> FloatArray:

@@ -57,7 +57,7 @@ def _from_rlbench(R_mount_recorded: FloatArray, position: tuple[float, float, fl
 
 
 def _fixed(position: tuple[float, float, float], quaternion_wxyz: tuple[float, ...], far: float) -> Camera:
-    R = Rotation.from_quat(quaternion_wxyz, scalar_first=True).as_matrix()
+    R = se3.from_wxyz(np.array(quaternion_wxyz))
     return Camera(_from_rlbench(R, position), np.radians(40.0), far)
 
 

@@ -175,23 +175,20 @@ def panda_self_filter() -> SelfFilter:
 
 
 def _add_body(parent: mujoco.MjsBody, name: str, T_parent_body: FloatArray) -> mujoco.MjsBody:
-    pose = se3.to_pose7(T_parent_body)
-    body = parent.add_body(name=name, pos=pose[:3], quat=pose[[6, 3, 4, 5]], gravcomp=1)
+    body = parent.add_body(name=name, pos=T_parent_body[:3, 3], quat=se3.to_wxyz(T_parent_body), gravcomp=1)
     body.mass, body.ipos, body.fullinertia = _MASS[name], _CENTRE_OF_MASS[name], _INERTIA[name]
     body.explicitinertial = True
     for i, shell in enumerate(SHELLS[name]):
-        quaternion = se3.to_pose7(se3.make(se3.euler(*shell.rpy)))[3:]
-        geom = body.add_geom(
-            name=f"{name}_{i}", pos=shell.position, quat=quaternion[[3, 0, 1, 2]], rgba=shell.rgba
-        )
+        quat = se3.to_wxyz(se3.euler(*shell.rpy))
+        geom = body.add_geom(name=f"{name}_{i}", pos=shell.position, quat=quat, rgba=shell.rgba)
         geom.type = getattr(mujoco.mjtGeom, f"mjGEOM_{shell.kind.upper()}")
         geom.size = shell.size
     return body
 
 
 def _add_tip(hand: mujoco.MjsBody) -> None:
-    pose = se3.to_pose7(se3.invert(T_FLANGE_HAND) @ T_FLANGE_TIP)
-    hand.add_site(name="tip", pos=pose[:3], quat=pose[[6, 3, 4, 5]], group=4)
+    T_hand_tip = se3.invert(T_FLANGE_HAND) @ T_FLANGE_TIP
+    hand.add_site(name="tip", pos=T_hand_tip[:3, 3], quat=se3.to_wxyz(T_hand_tip), group=4)
 
 
 def _add_fingers(spec: mujoco.MjSpec, hand: mujoco.MjsBody) -> None:

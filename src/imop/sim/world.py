@@ -9,7 +9,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from imop.errors import InvalidInput
 from imop.geometry import se3
@@ -61,9 +60,7 @@ def scene_spec() -> Any:
         for y in (TABLE_LOWER[1] + 0.05, TABLE_UPPER[1] - 0.1):
             _box(table, (x, y, 0), (x + 0.05, y + 0.05, TABLE_HEIGHT - 0.04), wood)
     world.add_light(pos=[0.5, 0, 3], dir=[0, 0, -1], castshadow=False)
-    base = world.add_frame(
-        pos=T_WORLD_BASE[:3, 3], quat=Rotation.from_matrix(T_WORLD_BASE[:3, :3]).as_quat(scalar_first=True)
-    )
+    base = world.add_frame(pos=T_WORLD_BASE[:3, 3], quat=se3.to_wxyz(T_WORLD_BASE))
     spec.attach(panda_spec(), prefix=ROBOT, frame=base)
     _add_attach_volume(spec)
     return spec
@@ -72,7 +69,7 @@ def scene_spec() -> Any:
 def _add_attach_volume(spec: Any) -> None:
     """An invisible box between the open fingers, RLBench's attach sensor without what lies outside them."""
     hand, tip = spec.body(f"{ROBOT}hand"), spec.site(f"{ROBOT}tip")
-    T_hand_tip = se3.from_pose7(np.array([*tip.pos, *np.roll(tip.quat, -1)]))
+    T_hand_tip = se3.make(se3.from_wxyz(tip.quat), tip.pos)
     hand.add_geom(
         name=ATTACH_VOLUME,
         type=mujoco.mjtGeom.mjGEOM_BOX,
@@ -189,15 +186,14 @@ class World:
             InvalidInput: if `body` is held by another joint or by another body.
         """
         T = as_pose("T_world_body", T_world_body)
-        quaternion = Rotation.from_matrix(T[:3, :3]).as_quat(scalar_first=True)
         found = self.model.body(body)
         joints, first = int(found.jntnum[0]), int(found.jntadr[0])
         if joints == 1 and self.model.jnt_type[first] == mujoco.mjtJoint.mjJNT_FREE:
             start, dof = int(self.model.jnt_qposadr[first]), int(self.model.jnt_dofadr[first])
-            self.data.qpos[start : start + 7] = (*T[:3, 3], *quaternion)
+            self.data.qpos[start : start + 7] = (*T[:3, 3], *se3.to_wxyz(T))
             self.data.qvel[dof : dof + 6] = 0
         elif joints == 0 and int(found.parentid[0]) == 0:
-            found.pos, found.quat = T[:3, 3], quaternion
+            found.pos, found.quat = T[:3, 3], se3.to_wxyz(T)
         else:
             raise InvalidInput(
                 "body", f"{body} has a parent", "a body with a free joint, or fixed in the world"

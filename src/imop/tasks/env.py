@@ -16,7 +16,7 @@ from imop.sim.motion import WORKSPACE_LOWER, WORKSPACE_UPPER
 from imop.sim.world import World
 from imop.tasks.rlbench import RLBENCH
 from imop.tasks.tabletop import TABLETOP
-from imop.tasks.task import Task, make_scene, watching
+from imop.tasks.task import Task, make_scene, wait, watching
 from imop.types import Action, CameraView, FloatArray, Observation, as_array
 
 IMAGE = 128
@@ -214,6 +214,10 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
             info["plan_failed"] = error.reason
         terminated = info["success"] or "plan_failed" in info
         return self._observe(steps), float(info["success"]), terminated, steps >= self._step_limit, info
+
+    def wait(self) -> bool:
+        """After the last action, let go on what still rolls or falls; whether the aim is reached then."""
+        return wait(self.task, self.world, watching(self.task, self.on_frame))
 
     def _observe(self, time_step: int) -> ObservationDict:
         self._observation = observe(self.world, min(time_step, self._step_limit))

@@ -5,14 +5,11 @@ from dataclasses import replace
 from imop.errors import ImopError, PlanFailed
 from imop.sim.cameras import observe
 from imop.sim.execute import move, plan_for
-from imop.sim.gripper import PERIOD_STEPS, OnFrame, set_gripper
+from imop.sim.gripper import OnFrame, set_gripper
 from imop.sim.world import World
-from imop.tasks.task import Task, make_scene, watching
+from imop.tasks.task import Task, make_scene, wait, watching
 from imop.tasks.waypoint import Waypoint
 from imop.types import Action, Demonstration, Keyframe
-
-_EXTRA_PERIODS = 10
-"""Waited for what still rolls or falls after the last step, as RLBench does."""
 
 
 class ExpertFailed(ImopError):
@@ -68,12 +65,7 @@ def perform(task: Task, world: World, on_frame: OnFrame | None = None) -> Demons
             keyframes.append(_follow(world, task.waypoints(world)[step], step, watch, task.insist))
         except PlanFailed as error:
             raise ExpertFailed(task.name, step, error.reason) from error
-    for _ in range(_EXTRA_PERIODS):
-        if task.success(world):
-            break
-        world.step(PERIOD_STEPS)
-        watch(world)
-    if not task.success(world):
+    if not wait(task, world, watch):
         raise ExpertFailed(task.name, count, "all waypoints were reached, but not the aim")
     return Demonstration(tuple(keyframes), observe(world, time_step=count), task=task.name)
 

@@ -7,9 +7,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from imop.errors import InvalidInput
-from imop.sim.gripper import OnFrame
+from imop.sim.gripper import PERIOD_STEPS, OnFrame
 from imop.sim.world import World, allow_grasp, scene_spec
 from imop.tasks.waypoint import Waypoint
+
+_EXTRA_PERIODS = 10
+"""Of 0.05 simulated seconds."""
 
 
 class Task(ABC):
@@ -45,6 +48,9 @@ class Task(ABC):
     def furnish(self, spec: Any, rng: np.random.Generator) -> None:  # noqa: B027 (optional)
         """Add what differs from scene to scene and the task does not need; nothing by default."""
 
+    def prepare(self, world: World) -> None:  # noqa: B027 (optional)
+        """Say of the compiled scene what its bodies do not, such as what is one thing; nothing by default."""
+
     @abstractmethod
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Place everything at random so that the expert can begin.
@@ -76,6 +82,16 @@ def watching(task: Task, on_frame: OnFrame | None) -> OnFrame:
     return watch
 
 
+def wait(task: Task, world: World, watch: OnFrame) -> bool:
+    """Let go on what rolls or falls after the last step, as RLBench does; whether the aim is reached."""
+    for _ in range(_EXTRA_PERIODS):
+        if task.success(world):
+            return True
+        world.step(PERIOD_STEPS)
+        watch(world)
+    return task.success(world)
+
+
 def make_scene(task: Task, variation: int, instance_seed: int, seed: int) -> World:
     """The scene of one episode: same arguments, same scene.
 
@@ -97,5 +113,6 @@ def make_scene(task: Task, variation: int, instance_seed: int, seed: int) -> Wor
     for body in task.graspable:
         allow_grasp(spec, body)
     world = World(spec)
+    task.prepare(world)
     task.reset(world, np.random.default_rng((seed, 2)))
     return world

@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 
 from imop.geometry import se3
+from imop.geometry.accuracy import COARSE, FINE
 from imop.networks.model import Model
 from imop.training.data import PairDataset, RouteDataset, loader
 from imop.training.objective import predicted_poses, right_poses
@@ -88,7 +89,7 @@ def _measure(model: Model, batch: PairBatch) -> dict[str, list[float]]:
             ]
             measured["match"].append(max(float(hit.float().mean()) for hit in near))
     right = [goals.numpy() for goals in right_poses(batch)]
-    for name, distance, angle in (("within_1cm_5deg", 0.01, 5.0), ("within_2cm_10deg", 0.02, 10.0)):
+    for name, distance, angle in (("within_1cm_5deg", *FINE), ("within_2cm_10deg", *COARSE)):
         limits = distance, np.radians(angle)
         measured[name] = [float(se3.near(right[b], T[b], *limits).any()) for b in range(len(T))]
     return measured

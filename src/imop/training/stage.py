@@ -137,13 +137,12 @@ class Stage:
         """Put everything where the state says."""
         world = self._world
         for i, T in enumerate(state.poses):
-            quaternion = np.roll(se3.to_pose7(T)[3:], 1)
             body = world.model.body(f"thing{i}/body")
             if body.jntnum[0]:
                 start = int(world.model.jnt_qposadr[body.jntadr[0]])
-                world.data.qpos[start : start + 7] = (*T[:3, 3], *quaternion)
+                world.data.qpos[start : start + 7] = (*T[:3, 3], *se3.to_wxyz(T))
             else:
-                body.pos, body.quat = T[:3, 3], quaternion
+                body.pos, body.quat = T[:3, 3], se3.to_wxyz(T)
             for link in self.links[i]:
                 if link != "body":
                     joint = world.model.joint(f"thing{i}/{link}")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from imop.tasks.coppelia.reader import read_model
-from tests.conftest import SHARED
+from tests.conftest import shared
 from tests.tasks.coppelia import writer
 
 HALF_TURN = (0, 0, 0, 1)  # w x y z: about z
@@ -45,7 +45,4 @@ def cupboard_model():
 @pytest.fixture(scope="session")
 def rlbench_models() -> Path:
     """Folder of RLBench's model files, which may not be copied into the repository."""
-    path = SHARED / "data" / "rlbench_ttm"
-    if not path.is_dir():
-        pytest.skip(f"RLBench's model files are not part of imop; looked for {path}")
-    return path
+    return shared("rlbench_ttm")

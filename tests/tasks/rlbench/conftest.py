@@ -5,7 +5,7 @@ import pytest
 from imop.tasks.coppelia.reader import read_model
 from imop.tasks.rlbench import RLBENCH, assets
 from imop.tasks.rlbench.scene import Scene
-from tests.conftest import SHARED
+from tests.conftest import shared
 from tests.tasks.coppelia.conftest import cupboard
 from tests.tasks.coppelia.test_convert import world_of
 
@@ -20,9 +20,7 @@ def scene():
 
 
 def provide(folder, files):
-    source = SHARED / "data" / "rlbench_ttm"
-    if not source.is_dir():
-        pytest.skip(f"RLBench's model files are not part of imop; looked for {source}")
+    source = shared("rlbench_ttm")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(folder))
         assets.install(source, files)

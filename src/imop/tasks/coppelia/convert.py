@@ -10,7 +10,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from imop.errors import InvalidInput
 from imop.geometry import se3
@@ -76,14 +75,13 @@ def add_model(spec: Any, model: Model, prefix: str = "") -> None:
 
 
 def _body(parent: Any, name: str, T: FloatArray) -> Any:
-    quaternion = Rotation.from_matrix(T[:3, :3]).as_quat(scalar_first=True)
-    return parent.add_body(name=name, pos=T[:3, 3], quat=quaternion)
+    return parent.add_body(name=name, pos=T[:3, 3], quat=se3.to_wxyz(T))
 
 
 def _set_mass(body: Any, shape: Shape, mass: float, moments: FloatArray) -> None:
     T = shape.T_shape_inertia
     body.mass, body.inertia, body.explicitinertial = mass, moments, True
-    body.ipos, body.iquat = T[:3, 3], Rotation.from_matrix(T[:3, :3]).as_quat(scalar_first=True)
+    body.ipos, body.iquat = T[:3, 3], se3.to_wxyz(T)
 
 
 def _add_joint(body: Any, joint: Joint, prefix: str, inertia: float) -> None:

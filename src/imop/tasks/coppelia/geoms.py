@@ -6,7 +6,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from imop.geometry import se3
 from imop.tasks.coppelia.model import Model, Piece, Shape
@@ -212,7 +211,7 @@ def _add(
     body.add_geom(
         name=name,
         pos=T[:3, 3],
-        quat=Rotation.from_matrix(T[:3, :3]).as_quat(scalar_first=True),
+        quat=se3.to_wxyz(T),
         rgba=[*own_color(piece.color), 1.0],
         group=SEEN_GROUP if drawn else UNSEEN_GROUP,
         contype=int(solid),

@@ -7,7 +7,6 @@ saves and restores with its state; free bodies by their joint. Nothing has to be
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from imop.errors import InvalidInput
 from imop.geometry import se3
@@ -36,8 +35,7 @@ def place(world: World, model: Model, name: str, T_world_object: FloatArray, pre
         body = world.model.body(prefix + name)
         parent = world.model.body(int(body.parentid[0])).name
         T_parent_object = se3.invert(world.pose(parent)) @ T
-        body.pos = T_parent_object[:3, 3]
-        body.quat = Rotation.from_matrix(T_parent_object[:3, :3]).as_quat(scalar_first=True)
+        body.pos, body.quat = T_parent_object[:3, 3], se3.to_wxyz(T_parent_object)
         world.forward()
     for n, pose in poses.items():
         world.set_free_pose(prefix + n, pose)

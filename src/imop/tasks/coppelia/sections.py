@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from imop.errors import ModelFormatError
 from imop.geometry import se3
@@ -109,7 +108,7 @@ class Values:
         p, q = (seven[:3], seven[3:]) if position_first else (seven[4:], seven[:4])
         if np.linalg.norm(q) < 1e-3:
             raise ModelFormatError(start, "a quaternion of length 0", "a unit quaternion")
-        return se3.make(Rotation.from_quat(q, scalar_first=True).as_matrix(), p)
+        return se3.make(se3.from_wxyz(q), p)
 
 
 class Section:

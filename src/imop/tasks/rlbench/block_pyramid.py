@@ -2,6 +2,7 @@
 
 # ruff: noqa: D102 (the methods are described in Task and RLBenchTask)
 from collections.abc import Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -32,6 +33,9 @@ class BlockPyramid(RLBenchTask):
     variations = len(NAMES)
     yaw = (-np.pi / 8, np.pi / 8)
     graspable = (*BLOCKS, *DISTRACTORS)
+    frames = MappingProxyType(
+        {f"waypoint{6 * k + i}": "block_pyramid_plane" for k in range(len(BLOCKS)) for i in (3, 4, 5)}
+    )
 
     def init_episode(self, scene: Scene, rng: np.random.Generator) -> None:
         color = NAMES[self.variation]

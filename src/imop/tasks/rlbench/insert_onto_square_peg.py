@@ -2,7 +2,6 @@
 
 # ruff: noqa: D102 (the methods are described in Task and RLBenchTask)
 from collections.abc import Sequence
-from types import MappingProxyType
 
 import numpy as np
 
@@ -10,6 +9,8 @@ from imop.tasks.rlbench.colors import NAMES, others
 from imop.tasks.rlbench.conditions import Condition, Detected
 from imop.tasks.rlbench.scene import Scene
 from imop.tasks.rlbench.task import RLBenchTask
+
+PILLARS = ("pillar0", "pillar1", "pillar2")
 
 
 class InsertOntoSquarePeg(RLBenchTask):
@@ -24,16 +25,15 @@ class InsertOntoSquarePeg(RLBenchTask):
         "place the ring onto the {} spoke",
     )
     graspable = ("square_ring",)
-    # The peg differs between episodes, its place has one name.
-    frames = MappingProxyType({"waypoint3": "success_centre", "waypoint4": "success_centre"})
 
     def init_episode(self, scene: Scene, rng: np.random.Generator) -> None:
         color = NAMES[self.variation]
-        order = [str(pillar) for pillar in rng.permutation(["pillar0", "pillar1", "pillar2"])]
-        for pillar, painted in zip(order, [color, *others(rng, color, 2)], strict=True):
+        places = [scene.pose(pillar)[:3, 3] for pillar in PILLARS]
+        # The aim always is the same peg, at another place.
+        colors = [*others(rng, color, 2), color]
+        for pillar, painted, k in zip(PILLARS, colors, rng.permutation(3), strict=True):
             scene.paint(pillar, painted)
-        x, y, _ = scene.pose(order[0])[:3, 3]
-        scene.move("success_centre", (x, y, scene.pose("success_centre")[2, 3]))
+            scene.move(pillar, places[k])
         self.boundary(scene, rng, "boundary0").sample("square_ring")
 
     def conditions(self) -> Sequence[Condition]:

@@ -8,19 +8,23 @@ from imop.tasks.coppelia.model import Model, Shape
 
 
 def separate(world: World, model: Model) -> None:
-    """Let every fixed shape that is seen be an instance of its own, as in RLBench's masks.
+    """Let every fixed thing that is seen be an instance of its own, named after its uppermost part.
 
-    To the world all that stands still in a task is one thing, because it hangs on one base.
+    To the world all that stands still in a task is one thing, because it hangs on one base. What is only
+    felt (a bin) is one thing with what is drawn for it.
     """
-    base = world.model.body(model.objects[0].name).id
+    numbers = [int(world.model.body(o.name).id) for o in model.objects]
+    base = numbers[0]
     seen = {int(world.model.geom_bodyid[g]) for g in np.flatnonzero(world.model.geom_group == SEEN_GROUP)}
-    for o in model.objects:
-        body = world.model.body(o.name).id
-        if world.instances[body] != base:
+    fixed = [int(world.model.body_weldid[n]) == 0 for n in numbers]
+    for i, o in enumerate(model.objects):
+        body, parent = numbers[i], int(world.model.body_parentid[numbers[i]])
+        if body == base or world.instances[body] != base:
             continue
-        parent = int(world.model.body_parentid[body])
-        own = isinstance(o, Shape) and body in seen and parent not in seen
-        world.instances[body] = body if own else world.instances[parent] if body != base else base
+        plane = isinstance(o, Shape) and not o.respondable and body not in seen
+        shows = any(fixed[j] and numbers[j] in seen for j in model.subtree(i))
+        own = world.instances[parent] == base and shows and not plane
+        world.instances[body] = body if own else world.instances[parent]
     for body in np.unique(world.instances[world.instances > 0]):
         world.instance_names.setdefault(int(body), world.model.body(int(body)).name)
 

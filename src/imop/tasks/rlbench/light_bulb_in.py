@@ -40,7 +40,8 @@ class LightBulbIn(RLBenchTask):
         scene.paint(f"bulb_holder{target}", color)
         scene.paint(f"bulb_holder{1 - target}", others(rng, color)[0])
         scene.move("waypoint1", scene.point(f"bulb{target}", (0, 0, 0.01)))
-        self.frames = dict.fromkeys(("waypoint0", "waypoint1"), f"bulb_phys{target}")
+        bulb = f"bulb_phys{target}"
+        self.frames = {"waypoint0": bulb, "waypoint1": bulb, "waypoint2": "lamp_base"}
 
     def conditions(self) -> Sequence[Condition]:
         return [

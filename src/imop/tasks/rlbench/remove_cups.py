@@ -53,7 +53,7 @@ class RemoveCups(RLBenchTask):
             down = se3.make(T_down[:3, :3], (*scene.pose(place)[:2, 3], T_down[2, 3]))
             steps += carried(scene, mug, "waypoint1", grasp, ("waypoint0", "waypoint1"))
             steps += carried(scene, "place_cups_holder_base", "waypoint2", off, ("waypoint2", "waypoint3"))
-            steps += carried(scene, place, "waypoint5", down, ("waypoint4", "waypoint5"))
+            steps += carried(scene, "place_cups_holder_base", "waypoint5", down, ("waypoint4", "waypoint5"))
         return steps
 
     def conditions(self) -> Sequence[Condition]:

@@ -2,6 +2,7 @@
 
 # ruff: noqa: D102 (the methods are described in Task and RLBenchTask)
 from collections.abc import Sequence
+from types import MappingProxyType
 
 from imop.tasks.rlbench.conditions import Condition, Detected
 from imop.tasks.rlbench.task import RLBenchTask
@@ -21,6 +22,16 @@ class StraightenRope(RLBenchTask):
     )
     step_limit = 50
     table_friction = 1.0
+    frames = MappingProxyType(
+        {
+            "waypoint0": "tail",
+            "waypoint1": "head_tail",
+            "waypoint2": "head_tail",
+            "waypoint3": "head",
+            "waypoint4": "head",
+            "waypoint5": "head_target",
+        }
+    )
 
     def conditions(self) -> Sequence[Condition]:
         return [

@@ -43,7 +43,8 @@ class TakeMoneyOutSafe(RLBenchTask):
         for moved in (stack, *STACKS):
             self.boundary(scene, rng, "money_boundary").sample(moved, _YAW, 0.0)
         scene.place("waypoint1", scene.pose(stack) @ T_stack_grasp)
-        self.frames = dict.fromkeys(("waypoint0", "waypoint1", "waypoint2"), stack)
+        of_stack = dict.fromkeys(("waypoint0", "waypoint1", "waypoint2"), stack)
+        self.frames = {**of_stack, "waypoint3": "safe_body"}
 
     def conditions(self) -> Sequence[Condition]:
         return [

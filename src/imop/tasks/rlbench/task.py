@@ -31,6 +31,7 @@ from imop.types import FloatArray
 DOWN = se3.euler(x=np.pi) @ se3.euler(z=np.pi)
 """Orientation of the tip that looks down, its x axis towards the robot's base."""
 _ON_THE_WAY, _DEPTH = 12, 0.003
+_IN_PLACE = 0.005
 _STOPPING = 0.05
 """Seconds in which a loose thing loses most of its speed."""
 _ATTEMPTS = 300
@@ -136,6 +137,9 @@ class RLBenchTask(Task):
         for geom in spec.body("table").geoms:
             geom.friction[0] = self.table_friction
 
+    def prepare(self, world: World) -> None:
+        separate(world, self.model)
+
     def init_episode(self, scene: Scene, rng: np.random.Generator) -> None:
         """Arrange the variation's scene, before the task is placed as a whole; nothing by default.
 
@@ -149,7 +153,6 @@ class RLBenchTask(Task):
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
         scene = Scene(world, self.model)
-        separate(world, self.model)
         world.unavoided = unavoided(world, self.model)
         for name in self.loose:
             first, body = int(world.model.joint(name).dofadr[0]), world.model.body(name)
@@ -204,6 +207,7 @@ class RLBenchTask(Task):
 
     def waypoints(self, world: World) -> Sequence[Waypoint]:
         scene, gripper_open, found = Scene(world, self.model), True, []
+        p_before = world.T_world_gripper[:3, 3]
         for step in self.steps(scene):
             words = read_words(self.model[step.waypoint].extension)
             T = scene.pose(step.waypoint) if step.T_world_tip is None else step.T_world_tip
@@ -215,8 +219,12 @@ class RLBenchTask(Task):
             T_frame_poses = se3.invert(scene.pose(frame)) @ poses
             for k, T_frame_gripper in enumerate(T_frame_poses):
                 last = k == len(poses) - 1
+                gripper_before = gripper_open
                 gripper_open = words.gripper_open if last and words.gripper_open is not None else gripper_open
-                linear = words.linear or len(poses) > 1
+                # What is turned in place would be dragged away on any other way.
+                in_place = np.linalg.norm(poses[k, :3, 3] - p_before) < _IN_PLACE and not gripper_before
+                linear = words.linear or len(poses) > 1 or bool(in_place)
+                p_before = poses[k, :3, 3]
                 found.append(Waypoint(frame, T_frame_gripper, gripper_open, words.ignore_collisions, linear))
         return found
 

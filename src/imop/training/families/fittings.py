@@ -26,7 +26,7 @@ def slanted(
         type=mujoco.mjtGeom.mjGEOM_BOX,
         pos=list(center),
         size=list(half),
-        quat=_wxyz(R),
+        quat=se3.to_wxyz(R),
         rgba=rgba(color),
         density=density,
     )
@@ -56,7 +56,7 @@ def ball(body: Any, center: Point, radii: Point, color: Color, density: float = 
 
 def inner(body: Any, name: str, R: FloatArray, p: Point) -> Any:
     """A body that is fixed to `body`, turned by `R` (3, 3), at `p` metres."""
-    return body.add_body(name=name, pos=list(p), quat=_wxyz(R))
+    return body.add_body(name=name, pos=list(p), quat=se3.to_wxyz(R))
 
 
 def link(
@@ -92,7 +92,3 @@ def board(body: Any, x: float, y: float, upright: bool, color: Color, thick: flo
 def down_upright(p: tuple[float, float, float]) -> FloatArray:
     """T_board_gripper (4, 4) that comes straight down at `p` of a board that stands, closing along y."""
     return se3.make(UPRIGHT.T @ from_above((0, 0, 0))[:3, :3], p)
-
-
-def _wxyz(R: FloatArray) -> list[float]:
-    return [float(v) for v in np.roll(se3.to_pose7(se3.make(R))[3:], 1)]

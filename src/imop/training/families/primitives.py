@@ -106,8 +106,7 @@ class Piece:
 
     def add(self, spec: Any, body: Any, name: str, color: Color) -> None:
         """Add it to a body of a part."""
-        pose = se3.to_pose7(self.T)
-        inner = body.add_body(name=name, pos=pose[:3], quat=np.roll(pose[3:], 1))
+        inner = body.add_body(name=name, pos=self.T[:3, 3], quat=se3.to_wxyz(self.T))
         x, y, z = self.half.tolist()
         if self.kind == "box":
             box(inner, (-x, -y, -z), (x, y, z), color, PLASTIC)

@@ -53,12 +53,8 @@ def slab(shape: np.random.Generator, color: np.random.Generator) -> Thing:
     if not stands:
         y = min(y, 0.037)
     spec, body = part(fixed=True)
-    flat = body.add_body(
-        name="flat",
-        pos=[0, 0, y if stands else t],
-        quat=np.roll(se3.to_pose7(se3.make(se3.euler(x=np.pi / 2) if stands else np.eye(3)))[3:], 1),
-    )
     T_body_flat = se3.make(se3.euler(x=np.pi / 2) if stands else np.eye(3), (0, 0, y if stands else t))
+    flat = body.add_body(name="flat", pos=T_body_flat[:3, 3], quat=se3.to_wxyz(T_body_flat))
     box(flat, (-x, -y, -t), (x, y, t), paint(color), PLASTIC)
     symmetry = _DECORATIONS[int(shape.integers(len(_DECORATIONS)))](shape, color, flat, (x, y, t))
     at = shape.uniform(-0.5, 0.5) * x
