@@ -50,10 +50,17 @@ def test_a_larger_box_is_not_a_small_one():
     assert judged(small, large, corner) < 0.8 * judged(small, box((0.04, 0.04, 0.04), RED, seed=1), np.eye(4))
 
 
-def test_faces_point_the_same_way():
+def test_a_wall_seen_from_its_other_side_is_almost_as_good_as_from_the_same():
     region = box(SIZE, RED)
     inside_out = type(region)(region.points, region.colors, region.camera, -region.normals)
-    assert judged(region, inside_out, np.eye(4)) < 0.05
+    same = judged(region, region, np.eye(4))
+    assert 0.8 * same < judged(region, inside_out, np.eye(4)) < 0.95 * same
+
+
+def test_faces_across_each_other_do_not_explain_each_other():
+    region = box(SIZE, RED)
+    across = type(region)(region.points, region.colors, region.camera, np.roll(region.normals, 1, axis=1))
+    assert judged(region, across, np.eye(4)) < 0.05
 
 
 def test_unseen_space_costs_less_than_empty_space():

@@ -24,6 +24,9 @@ class Tolerances:
         along: the same along that plane, metres; it tells where a face ends.
         shade: standard deviation of the difference of two shades, see `shades`.
         depth: how far behind a point a camera must see to prove it absent, metres.
+        behind: what a counterpart counts that faces the other way: thin walls are seen from either side, and
+            where both sides fall into one voxel its normal is that of one of them. Nothing solid is turned
+            inside out by a motion, so little is lost.
         grazing: cosine of the angle to its normal from which a camera sees a face at all.
         hidden: what a point that no camera can see costs, as a share of an unexplained one.
         around: observed points this near to the moved region have to be explained by it, metres.
@@ -36,6 +39,7 @@ class Tolerances:
     along: float = 0.008
     shade: float = 0.25
     depth: float = 0.02
+    behind: float = 0.9
     grazing: float = 0.25
     hidden: float = 0.5
     around: float = 0.04
@@ -81,7 +85,8 @@ class Surface:
         tolerances = self.tolerances
         error = (offset / tolerances.offset) ** 2 + (shade / tolerances.shade) ** 2
         error += (along / tolerances.along) ** 2
-        agreement = np.where(found, np.exp(-0.5 * error) * np.clip(facing, 0.0, 1.0), 0.0)
+        facing = np.clip(np.where(facing < 0, -tolerances.behind * facing, facing), 0.0, 1.0)
+        agreement = np.where(found, np.exp(-0.5 * error) * facing, 0.0)
         return agreement, index
 
     def near(self, points: FloatArray) -> BoolArray:
