@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 
 from imop.evaluation.appearance import FINE_TURNS, Appearance
+from imop.geometry import se3
 from imop.sim.parts.cup import CupShape, cup
 from imop.sim.parts.faucet import FaucetShape, faucet
 from imop.sim.parts.shapes import add_to, box, part
@@ -77,6 +78,26 @@ def test_the_upright_axis_counts_whatever_its_name():
     body.add_geom(type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[0.04, 0.05, 0], quat=quat, rgba=[*RED, 1])
     turns = Appearance(World(spec)).turns("pot")
     assert len(turns) == FINE_TURNS and np.allclose(turns[:, 0, 0], 1)
+
+
+def test_the_frame_need_not_lie_on_the_axis():
+    spec = scene_spec()
+    tilted = [np.cos(0.06), 0, np.sin(0.06), 0]
+    body = spec.worldbody.add_body(name="pot", pos=[0.3, 0, 0.8], quat=tilted)
+    body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[0.04, 0.05, 0],
+        pos=se3.euler(y=-0.12) @ (0.02, 0.01, 0.03),
+        quat=[tilted[0], 0, -tilted[2], 0],
+        rgba=[*RED, 1],
+    )
+    turns = Appearance(World(spec)).turns("pot")
+    assert len(turns) == FINE_TURNS
+    T_world_pot = se3.make(se3.euler(y=0.12), (0.3, 0, 0.8))
+    turned = T_world_pot @ turns @ se3.invert(T_world_pot)
+    axis = np.array([0.32, 0.01, 0.8, 1.0])
+    assert np.allclose(turned @ axis, axis, atol=0.001)
+    assert np.allclose(turned[:, 2, 2], 1)
 
 
 def test_objects_are_alike_in_shape_and_color(appearance):
