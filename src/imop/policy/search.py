@@ -57,7 +57,7 @@ class SearchConfig:
     tilt: float = 0.35
     change: float = 0.12
     sure: float = 0.7
-    opinion: float = 0.05
+    opinion: float = 0.1
 
 
 class Search:
