@@ -134,7 +134,8 @@ class Inquiry:
         other = self._as_repeated(T) if straight == best else motions[straight]
         found += [self._refined(other), self._upright(T)]
         if self._config.turned:
-            found.append(self._refined(self._half_turn(T)))
+            turned = self._refined(self._half_turn(T))
+            found += [turned, self._upright(turned.T_query_support)]
         found.append(self._finished(self._ordered(found)[0].T_query_support))
         ordered = self._ordered(found)
         return ordered if ordered[0].score >= self._config.sure else ()
@@ -211,11 +212,21 @@ class Inquiry:
         """The different ones among hypotheses, preferred first."""
         preference = np.array([self._preference(hypothesis) for hypothesis in found])
         motions = np.stack([hypothesis.T_query_support for hypothesis in found])
-        if self._opinion is not None:
-            support = self._opinion(motions)
-            preference += self._config.opinion * support / max(support.max(), 1e-9)
+        preference += self._config.opinion * self._supported(motions)
         order = np.argsort(-preference, kind="stable")
         return tuple(found[order[i]] for i in distinct(motions[order], self._center, len(found)))
+
+    def _supported(self, motions: FloatArray) -> FloatArray:
+        """(H,) the matcher's support of motions, 1 for the best; a half turn on, things have the same.
+
+        Networks match the left lever to the right one with full confidence: between these only what was seen
+        decides.
+        """
+        if self._opinion is None:
+            return np.zeros(len(motions))
+        turned = np.stack([self._half_turn(T) for T in motions])
+        support: FloatArray = np.maximum(self._opinion(motions), self._opinion(turned))
+        return support / max(support.max(), 1e-9)
 
     def _preference(self, hypothesis: Hypothesis) -> float:
         """The score, less for moving otherwise than demonstrated and for tilting what stands on a table.
