@@ -225,8 +225,8 @@ class Inquiry:
         if self._opinion is None:
             return np.zeros(len(motions))
         turned = np.stack([self._half_turn(T) for T in motions])
-        support: FloatArray = np.maximum(self._opinion(motions), self._opinion(turned))
-        return support / max(support.max(), 1e-9)
+        support = np.maximum(self._opinion(motions), self._opinion(turned))
+        return np.asarray(support / max(support.max(), 1e-9))
 
     def _preference(self, hypothesis: Hypothesis) -> float:
         """The score, less for moving otherwise than demonstrated and for tilting what stands on a table.
