@@ -65,6 +65,35 @@ def test_same_input_same_action(policy, wanted):
     assert same(first, policy.act(wanted.keyframes[0].observation))
 
 
+def test_what_the_arm_cannot_reach_gives_way_to_what_is_about_as_right(perception, shown, wanted):
+    asked = []
+
+    def not_the_first(T_world_gripper):
+        asked.append(T_world_gripper)
+        return len(asked) > 1
+
+    observation = wanted.keyframes[0].observation
+    free, bound = (
+        OneShotPolicy(RegistrationMatcher(), perception, feasible=f) for f in (None, not_the_first)
+    )
+    for policy in (free, bound):
+        policy.watch(shown)
+    first, second = free.act(observation), bound.act(observation)
+    np.testing.assert_allclose(asked[0], first.T_world_gripper)
+    # The lid is round: another turn is about as right.
+    assert len(asked) == 2 and np.allclose(asked[1], second.T_world_gripper)
+    assert not np.allclose(first.T_world_gripper, second.T_world_gripper)
+    assert se3.translation_distance(first.T_world_gripper, second.T_world_gripper) < 0.02
+
+
+def test_if_nothing_can_be_reached_the_best_is_said_all_the_same(perception, policy, shown, wanted):
+    observation = wanted.keyframes[0].observation
+    bound = OneShotPolicy(RegistrationMatcher(), perception, feasible=lambda T: False)
+    bound.watch(shown)
+    policy.reset()
+    assert same(bound.act(observation), policy.act(observation))
+
+
 def test_an_empty_table_is_no_confident_match(perception, shown, wanted):
     strict = OneShotPolicy(RegistrationMatcher(), perception, min_confidence=0.5)
     strict.watch(shown)

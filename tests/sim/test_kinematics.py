@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from imop.errors import InvalidInput
 from imop.geometry import se3
-from imop.sim.kinematics import follow, inverse_kinematics, line, tip_and_jacobian
+from imop.sim.kinematics import follow, inverse_kinematics, line, reachable, tip_and_jacobian
 from imop.sim.robot import JOINT_LOWER, JOINT_UPPER, PANDA_HOME_Q, tip_pose
 
 CONFIGURATIONS = st.integers(0, 10_000).map(
@@ -85,3 +85,9 @@ def test_following_a_line_stays_on_one_branch() -> None:
 def test_following_a_line_out_of_reach_fails() -> None:
     away = line(tip_pose(PANDA_HOME_Q), tip_pose(PANDA_HOME_Q) @ se3.make(p=(-2.0, 0, 0)), 100)
     assert follow(away, PANDA_HOME_Q) is None
+
+
+def test_what_is_a_step_away_can_be_reached_and_what_is_two_metres_away_cannot():
+    home = tip_pose(PANDA_HOME_Q)
+    assert reachable(home @ se3.make(p=(0, 0, 0.05)))
+    assert not reachable(se3.make(p=(2, 0, 0)) @ home)

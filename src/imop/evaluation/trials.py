@@ -12,6 +12,7 @@ from imop.networks.model import BUNDLED
 from imop.policy.baselines import ReplayPolicy
 from imop.policy.one_shot import OneShotPolicy
 from imop.policy.registration import RegistrationMatcher
+from imop.sim.kinematics import reachable
 from imop.sim.robot import panda_self_filter
 from imop.sim.world import World
 from imop.tasks.env import ImopEnv, make_env, make_task
@@ -108,10 +109,11 @@ def make_policy(
         return ReplayPolicy()
     perception = Perception(panda_self_filter().is_robot)
     if method == "registration":
-        return OneShotPolicy(RegistrationMatcher(), perception, min_confidence=min_confidence)
+        matcher = RegistrationMatcher()
+        return OneShotPolicy(matcher, perception, min_confidence=min_confidence, feasible=reachable)
     if method in ("learned", "routed"):
         return OneShotPolicy.from_pretrained(
-            weights or BUNDLED, perception, min_confidence, routed=method == "routed"
+            weights or BUNDLED, perception, min_confidence, method == "routed", reachable
         )
     if method == "oracle" and world is not None:
         return OraclePolicy(world)

@@ -1,5 +1,6 @@
 """The policy: watch a demonstration once, then act in scenes that were never seen."""
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,14 @@ from imop.networks.model import BUNDLED, load_model
 from imop.policy.hypotheses import confidence
 from imop.policy.learned import LearnedMatcher
 from imop.policy.learned_router import LearnedRouter
-from imop.policy.matcher import Matcher, PreparedStep, Scene, Transition
+from imop.policy.matcher import Hypothesis, Matcher, PreparedStep, Scene, Transition
 from imop.policy.router import AdvancingRouter, Router
 from imop.types import Action, Demonstration, FloatArray, Match, Observation
+
+Feasible = Callable[[FloatArray], bool]
+
+# A hypothesis with this share of the best one's score may take its place if the arm cannot go there.
+INSTEAD = 0.8
 
 
 class OneShotPolicy:
@@ -24,6 +30,8 @@ class OneShotPolicy:
         router: chooses the demonstrated step; by default they follow each other. It may be replaced before
             anything is watched.
         min_confidence: below it `act` raises `NoConfidentMatch`; 0 acts always.
+        feasible: whether the arm can take the gripper to T_world_gripper (4, 4); of poses that are about as
+            right, the first feasible one is taken.
     """
 
     def __init__(
@@ -32,11 +40,13 @@ class OneShotPolicy:
         perception: Perception,
         router: Router | None = None,
         min_confidence: float = 0.0,
+        feasible: Feasible | None = None,
     ):
         self._matcher = matcher
         self._perception = perception
         self.router = router or AdvancingRouter()
         self._min_confidence = min_confidence
+        self._feasible = feasible or (lambda T_world_gripper: True)
         self._demonstrations: list[list[Transition]] = []
         self._prepared: list[list[PreparedStep]] = []
         self._cameras: set[str] = set()
@@ -49,6 +59,7 @@ class OneShotPolicy:
         perception: Perception | None = None,
         min_confidence: float = 0.0,
         routed: bool = False,
+        feasible: Feasible | None = None,
     ) -> "OneShotPolicy":
         """The learned policy.
 
@@ -58,6 +69,7 @@ class OneShotPolicy:
             min_confidence: below it `act` raises `NoConfidentMatch`.
             routed: whether the routing network chooses the step, so that what failed is repeated; otherwise
                 steps follow each other.
+            feasible: whether the arm can take the gripper to a pose.
 
         Raises:
             CorruptData: if the weights are missing, damaged, do not fit their card, or are not trained for
@@ -69,7 +81,7 @@ class OneShotPolicy:
                 weights, "has no trained routing network", "merge one into it (docs/training.md)"
             )
         router = LearnedRouter(model) if routed else None
-        return cls(LearnedMatcher(model), perception or Perception(), router, min_confidence)
+        return cls(LearnedMatcher(model), perception or Perception(), router, min_confidence, feasible)
 
     def watch(self, demonstration: Demonstration) -> None:
         """Take in a demonstration; a further call adds another one.
@@ -116,11 +128,17 @@ class OneShotPolicy:
         if trust < self._min_confidence or not hypotheses:
             raise NoConfidentMatch(trust, self._min_confidence)
         self.router.took(number, step)
-        best = hypotheses[0]
+        best = self._chosen(hypotheses, demonstrated.T_world_gripper)
         self._hints = [best.T_query_support]
         T_world_gripper = _orthonormal(best.T_query_support @ demonstrated.T_world_gripper)
         match = Match(step, best.p_support, best.p_query, prepared.region)
         return Action(T_world_gripper, demonstrated.gripper_open, demonstrated.allow_collisions, trust, match)
+
+    def _chosen(self, hypotheses: Sequence[Hypothesis], T_demonstrated: FloatArray) -> Hypothesis:
+        """The first that the arm can follow among those about as good as the best; else the best."""
+        good = [h for h in hypotheses if h.score >= INSTEAD * hypotheses[0].score]
+        able = (h for h in good if self._feasible(_orthonormal(h.T_query_support @ T_demonstrated)))
+        return next(able, hypotheses[0])
 
     def _scene(self, observation: Observation) -> Scene:
         return Scene(observation, self._perception(observation))

@@ -5,7 +5,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from imop.geometry import se3
-from imop.sim.robot import JOINT_LOWER, JOINT_UPPER, T_FLANGE_TIP, T_WORLD_BASE, link_poses
+from imop.sim.robot import JOINT_LOWER, JOINT_UPPER, PANDA_HOME_Q, T_FLANGE_TIP, T_WORLD_BASE, link_poses
 from imop.types import FloatArray, as_pose
 
 _SAMPLES, _INTERVAL_DEGREES = 120, 330
@@ -48,6 +48,11 @@ def inverse_kinematics(
     q = q[np.all(np.isfinite(q) & (q >= JOINT_LOWER) & (q <= JOINT_UPPER), axis=1)]
     nearest: FloatArray = q[np.argsort(np.linalg.norm(q - q_reference, axis=1), kind="stable")][:limit]
     return nearest
+
+
+def reachable(T_world_gripper: FloatArray) -> bool:
+    """Whether the arm can put the tip at a pose (4, 4), collisions aside."""
+    return len(inverse_kinematics(T_world_gripper, PANDA_HOME_Q, 1)) > 0
 
 
 def line(T_from: FloatArray, T_to: FloatArray, steps: int) -> FloatArray:
