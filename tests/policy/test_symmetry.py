@@ -5,7 +5,7 @@ import pytest
 
 from imop.geometry import se3
 from imop.policy.evidence import Surface
-from imop.policy.symmetry import equal_turns
+from imop.policy.symmetry import equal_turns, half_turn
 from tests.policy.scenes import RED, TABLE, at, box, camera, colored
 
 VIEWS = {"above": camera()}
@@ -38,3 +38,20 @@ def test_a_cube_looks_the_same_in_four_turns():
 @pytest.mark.parametrize("size", [(0.12, 0.03, 0.04), (0.2, 0.1, 0.02)])
 def test_half_a_turn_alone_is_not_trusted(size):
     assert list(angles(box(size, RED, at(0.1, 0.1)))) == [0]
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.7, 2.0])
+def test_a_half_turn_goes_about_the_base_and_not_about_what_sticks_out(yaw):
+    rng = np.random.default_rng(0)
+    base = rng.uniform((-0.03, -0.1, 0), (0.03, 0.1, 0.03), (1500, 3))
+    spout = rng.uniform((0.03, -0.01, 0.02), (0.15, 0.01, 0.03), (200, 3))
+    T = at(0.2, 0.1, yaw=yaw)
+    S = half_turn(se3.apply(T, np.concatenate([base, spout])))
+    assert se3.rotation_distance(S, np.eye(4)) == pytest.approx(np.pi, abs=0.1)
+    middle = T[:3, 3]
+    assert np.linalg.norm((se3.apply(S, middle[None])[0] - middle)[:2]) < 0.01
+
+
+def test_any_thing_has_a_half_turn():
+    few = np.array([[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.02, 0.0]])
+    assert se3.rotation_distance(half_turn(few), np.eye(4)) == pytest.approx(np.pi)

@@ -17,6 +17,7 @@ from imop.policy.matcher import Hypothesis, Scene
 from imop.policy.objects import connected
 from imop.policy.refine import FINEST, Refiner, upright
 from imop.policy.region import Region
+from imop.policy.symmetry import half_turn
 from imop.types import BoolArray, FloatArray
 
 Opinion = Callable[[FloatArray], FloatArray]
@@ -79,6 +80,15 @@ class Search:
             # A thin part slides along itself; what it is fixed to holds it.
             self.coarse.append(region.whole.points[farthest_points(region.whole.points, 600)])
         self.fine = region.cloud.points[farthest_points(region.cloud.points, 1500)]
+        self._before = before
+
+    @cached_property
+    def half_turn(self) -> FloatArray:
+        """(4, 4) half a turn, in the demonstrated scene, of the thing that the region is part of."""
+        points = self._before.cloud.points[~self._before.ground.bare]
+        labels = connected(points)
+        part_of = labels[nearest(self.coarse[0], points)[1][:, 0]]
+        return half_turn(points[labels == np.bincount(part_of).argmax()])
 
     def without_held(self, query: Scene, cloud: PointCloud) -> PointCloud:
         """The part of a query's cloud that is not in the hand, if the region is not what is held."""
@@ -183,12 +193,8 @@ class Inquiry:
         return self._judge.judge(upright(T, self._center))
 
     def _half_turn(self, T: FloatArray) -> FloatArray:
-        """The motion, then half a turn about the vertical through the middle of the thing that it led to."""
-        points, labels = self.things.points, self.labels
-        led_to = labels[nearest(se3.apply(T, self._search.coarse[0]), points)[1][:, 0]]
-        p = middle(points[labels == np.bincount(led_to).argmax()])
-        R = se3.euler(z=np.pi)
-        return se3.make(R, p - R @ p) @ T
+        """The motion after half a turn of the thing that the region is part of."""
+        return T @ self._search.half_turn
 
     def _as_repeated(self, T: FloatArray) -> FloatArray:
         """The demonstrated motion, carried on to the place where `T` leads to."""

@@ -9,7 +9,9 @@ import numpy as np
 
 from imop.geometry import se3
 from imop.geometry.cloud import farthest_points
+from imop.geometry.neighbours import nearest
 from imop.policy.evidence import Surface
+from imop.policy.refine import Refiner, upright
 from imop.types import FloatArray
 
 TURNS = np.radians(np.arange(45.0, 360.0, 45.0))
@@ -19,6 +21,8 @@ ALIKE = 0.7
 # How far off the middle of what was seen the axis may be, metres.
 OFF = (-0.008, 0.0, 0.008)
 POINTS = 200
+# Axes of half turns that are tried, metres off the middle, how many of them are refined, and what is near.
+AXES, REFINED, NEAR = (-0.05, -0.025, 0.0, 0.025, 0.05), 4, 0.012
 
 
 def equal_turns(surface: Surface, center: FloatArray) -> FloatArray:
@@ -40,3 +44,30 @@ def equal_turns(surface: Surface, center: FloatArray) -> FloatArray:
     if all(np.isclose(angle, HALF) for angle, _ in found):
         found = []
     return np.stack([np.eye(4), *(T for _, T in found)])
+
+
+def half_turn(points: FloatArray) -> FloatArray:
+    """(4, 4) the half turn about the vertical that best lays a thing (N, 3) onto itself.
+
+    Most things look alike from both ends, about an axis that need not go through the middle of what was seen:
+    a faucet's goes through its base, whichever way the spout points.
+    """
+    few = points[farthest_points(points, POINTS)]
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    R = se3.euler(z=HALF)
+    axes = [middle + np.array([x, y, 0.0]) for x, y in product(AXES, AXES)]
+    motions = np.stack([se3.make(R, axis - R @ axis) for axis in axes])
+    best = motions[np.argsort(-_onto(few, points, motions), kind="stable")[:REFINED]]
+    if len(points) >= 5:
+        refine = Refiner(points)
+        best = np.stack([*best, *(upright(refine(few, T), middle) for T in best)])
+    chosen: FloatArray = best[np.argmax(_onto(few, points, best))]
+    return chosen
+
+
+def _onto(few: FloatArray, points: FloatArray, motions: FloatArray) -> FloatArray:
+    """(H,) share of `few` points that motions (H, 4, 4) carry near to `points`."""
+    moved = se3.apply(motions, few)
+    distance = nearest(moved.reshape(-1, 3), points)[0].reshape(len(motions), -1)
+    share: FloatArray = (distance < NEAR).mean(axis=1)
+    return share
