@@ -80,15 +80,17 @@ class Search:
             # A thin part slides along itself; what it is fixed to holds it.
             self.coarse.append(region.whole.points[farthest_points(region.whole.points, 600)])
         self.fine = region.cloud.points[farthest_points(region.cloud.points, 1500)]
-        self._before = before
+        self.half_turn = half_turn(self._thing(before))
 
-    @cached_property
-    def half_turn(self) -> FloatArray:
-        """(4, 4) half a turn, in the demonstrated scene, of the thing that the region is part of."""
-        points = self._before.cloud.points[~self._before.ground.bare]
+    def _thing(self, before: Scene) -> FloatArray:
+        """(N, 3) the thing in the demonstrated scene that the region is part of."""
+        points = before.cloud.points[~before.ground.bare]
+        if not len(points):
+            return self.region.cloud.points
         labels = connected(points)
         part_of = labels[nearest(self.coarse[0], points)[1][:, 0]]
-        return half_turn(points[labels == np.bincount(part_of).argmax()])
+        thing: FloatArray = points[labels == np.bincount(part_of).argmax()]
+        return thing
 
     def without_held(self, query: Scene, cloud: PointCloud) -> PointCloud:
         """The part of a query's cloud that is not in the hand, if the region is not what is held."""
