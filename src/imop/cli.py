@@ -148,7 +148,7 @@ def evaluate(
 
     log = out / "episodes.jsonl"
     results = evaluate_suite(
-        suite, split, tasks, methods.split(","), episodes, seed, instance, jobs, console, weights, log
+        suite, split, tasks, methods.split(","), episodes, seed, instance, jobs, console, log, weights
     )
     results.save(out)
     console.print(results.table())

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from joblib import Parallel, delayed
@@ -41,8 +40,8 @@ def evaluate_suite(
     instance: int,
     jobs: int,
     console: Console,
+    log: Path,
     weights: Path | None = None,
-    log: Path | None = None,
 ) -> Results:
     """Try every method in the same `episodes` scenes of every task.
 
@@ -56,8 +55,8 @@ def evaluate_suite(
         instance: of the objects.
         jobs: processes.
         console: for the progress.
-        weights: of the learned policy; None for the bundled ones.
         log: file of episodes; what is in it is not tried again.
+        weights: of the learned policy; None for the bundled ones.
 
     Raises:
         InvalidInput: for an unknown suite, split, task or method.
@@ -67,21 +66,21 @@ def evaluate_suite(
         raise InvalidInput("methods", unknown[0], ", ".join(METHODS))
     trials = suite_trials(suite, split, tasks, episodes, seed, instance)
     states = {method: method_state(method, weights) for method in methods}
-    with TemporaryDirectory() as folder:
-        known = EpisodeLog(log or Path(folder) / "episodes.jsonl")
-        missing = [
-            (trial, method)
-            for trial in (trial for of_task in trials.values() for trial in of_task)
-            for method in methods
-            if known.find(trial, method, states[method]) is None
-        ]
-        shown = _demonstrations([trial for trial, _ in missing], jobs, console)
-        work = [
-            delayed(attempt)(trial, shown[_shared(trial)], method, states[method], weights)
-            for trial, method in missing
-        ]
-        for episode in parallel(work, jobs, console, "episodes"):
-            known.add(episode)
+    known = EpisodeLog(log)
+    missing = [
+        (trial, method)
+        for of_task in trials.values()
+        for trial in of_task
+        for method in methods
+        if known.find(trial, method, states[method]) is None
+    ]
+    shown = _demonstrations([trial for trial, _ in missing], jobs, console)
+    work = [
+        delayed(attempt)(trial, shown[_shared(trial)], method, states[method], weights)
+        for trial, method in missing
+    ]
+    for episode in parallel(work, jobs, console, "episodes"):
+        known.add(episode)
     counts = {
         method: {
             task: _count([known.find(trial, method, states[method]) for trial in of_task])
