@@ -59,6 +59,30 @@ def test_the_same_question_has_the_same_answer(matcher):
     assert np.array_equal(first[0].T_query_support, second[0].T_query_support)
 
 
+GRAY = (0.5, 0.5, 0.5)
+
+
+def chain(side):
+    """Links that wind to one `side` and back, with a red and a blue end; the pose that grasps the red one."""
+    s = np.linspace(0.0, 1.0, 17)
+    heading = side * 1.4 * np.cos(2 * np.pi * s)
+    xy = np.cumsum(0.026 * np.stack([np.cos(heading), np.sin(heading)], axis=1), axis=0) - 0.1
+    colors = [RED, *[GRAY] * (len(s) - 2), BLUE]
+    links = [
+        box((0.03, 0.02, 0.02), c, at(*p, yaw=yaw)) for c, p, yaw in zip(colors, xy, heading, strict=True)
+    ]
+    return links, above(*xy[0], TABLE + 0.01) @ se3.make(se3.euler(z=-heading[0]))
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_what_bent_is_found_by_the_end_that_is_grasped(matcher, side):
+    links, grasp = chain(side)
+    step = matcher.prepare(transitions([scene(links, HOME), scene(links, grasp, 0.5)], [(grasp, False)]))[0]
+    links, wanted = chain(-side)
+    best = step.match(scene(links, HOME))[0]
+    assert se3.translation_distance(best.T_query_support @ grasp, wanted) < 0.02
+
+
 def test_a_query_without_points_gives_no_hypothesis(matcher):
     query = scene([], HOME)
     empty = type(query)(query.observation, query.cloud.select(np.arange(0)))

@@ -91,3 +91,15 @@ def test_closing_on_nothing_is_not_a_grasp():
     regions = find_regions(transitions(scenes, [(T, False) for T in poses]))
     assert [is_like(region, RED) for region in regions] == [True, True, True, False, False]
     assert is_like(regions[3], BLUE) and is_like(regions[4], BLUE)
+
+
+def test_what_is_next_to_a_place_is_a_part_of_the_region_around_its_nearest_point():
+    long = box((0.04, 0.4, 0.04), RED, at(0.2, 0.0))
+    contact = above(0.2, 0.18, TABLE + 0.02)
+    region = find_regions(
+        transitions([scene([long], HOME), scene([long], contact, 0.5)], [(contact, False)])
+    )[0]
+    part = region.next_to(np.array([0.2, 0.5, TABLE]), 0.05)
+    assert 0 < len(part.cloud) == len(part.weight) < len(region.cloud)
+    assert np.ptp(part.cloud.points[:, 1]) <= 0.05
+    assert part.cloud.points[:, 1].max() == region.cloud.points[:, 1].max()

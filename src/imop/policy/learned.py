@@ -21,7 +21,7 @@ from imop.networks.graph import Graph, build_graph
 from imop.networks.matching import Correspondence, reposition
 from imop.networks.model import Model
 from imop.networks.region import StepBatch, one_step
-from imop.policy.contacts import SAME, find_contacts, is_open
+from imop.policy.contacts import GRASP, SAME, find_contacts, is_open
 from imop.policy.hypotheses import agreement, sample_motions
 from imop.policy.matcher import Hypothesis, Scene, Transition
 from imop.policy.objects import find_objects
@@ -38,6 +38,12 @@ LETS_GO = 0.8
 LOOSE = 0.03
 # What stands this near to the region (metres) is its context.
 AROUND = 0.1
+# A region that no motion explains better than this may have bent. What of it is within `NEXT_TO` metres of
+# where the gripper goes has not, and is found instead if its matches support the whole less than this share
+# of what they support the part.
+BENT = 0.65
+NEXT_TO = 0.05
+CONTRADICTED = 0.9
 
 
 @dataclass(frozen=True)
@@ -71,14 +77,19 @@ class LearnedMatcher:
     def prepare(self, steps: Sequence[Transition]) -> list["LearnedStep"]:
         """Find the regions of a demonstration's steps and describe them."""
         objects = [find_objects(step.before.cloud, step.before.ground.plane) for step in steps]
-        held = find_contacts(steps, objects).p_gripper_held
-        return [LearnedStep(self, step, p_held) for step, p_held in zip(steps, held, strict=True)]
+        contacts = find_contacts(steps, objects)
+        return [
+            LearnedStep(self, step, p_held, bool(holding))
+            for step, p_held, holding in zip(steps, contacts.p_gripper_held, contacts.holding, strict=True)
+        ]
 
 
 class LearnedStep:
     """A demonstrated step prepared for the matching network."""
 
-    def __init__(self, matcher: LearnedMatcher, step: Transition, p_gripper_held: FloatArray) -> None:
+    def __init__(
+        self, matcher: LearnedMatcher, step: Transition, p_gripper_held: FloatArray, holding: bool
+    ) -> None:
         self._matcher = matcher
         model = matcher.model
         config = model.config.graph
@@ -97,6 +108,10 @@ class LearnedStep:
             self._middles.append(middle(self._region.whole.points))
         self._search = Search(matcher.search, step.before, self._region)
         self._turns = equal_turns(self._search.template.surface, self._middles[0])
+        self._part = self._region.next_to(step.action.T_world_gripper[:3, 3], NEXT_TO)
+        self._search_part = Search(matcher.search, step.before, self._part)
+        tip = step.before.observation.T_world_gripper[None, :3, 3]
+        self._in_hand = holding and bool(within(tip, self._part.cloud.points, GRASP)[0])
 
     def _inside(self, probability: Tensor) -> Tensor:
         """(R,) points of the region, in order of their index; the likeliest few if there seems to be none."""
@@ -129,7 +144,30 @@ class LearnedStep:
         if confirmed:
             return confirmed
         seeds = np.concatenate([fit, self._sampled(matches), self._upright(matches, inquiry)])
-        return inquiry.search(seeds)
+        whole = inquiry.search(seeds)
+        return whole if whole[0].score > BENT else self._unbent(matches, inquiry, whole)
+
+    def _unbent(
+        self, matches: "_Matches", inquiry: Inquiry, whole: tuple[Hypothesis, ...]
+    ) -> tuple[Hypothesis, ...]:
+        """Where the part of the region next to the gripper is, if that contradicts where the whole is.
+
+        A part in the hand has moved as the gripper has.
+        """
+        near = matches.of(self._part.cloud.points)
+        if len(near.x) < 3:
+            return whole
+        opinion = partial(self._opinion, near)
+        closer = Inquiry(self._search_part, inquiry.query, inquiry.things, inquiry.hints, opinion)
+        if self._in_hand:
+            part = closer.repeated()
+        else:
+            part = closer.search(np.concatenate([self._sampled(near), self._upright(near, inquiry)]))
+        motions = np.stack([part[0].T_query_support, whole[0].T_query_support])
+        if closer.alike(*motions):
+            return whole
+        for_part, for_whole = opinion(motions)
+        return part if self._in_hand or for_whole < CONTRADICTED * for_part else whole
 
     def _matches(self, found: Correspondence, seen: Graph) -> "_Matches":
         """The likeliest query points of every region point."""
@@ -185,6 +223,11 @@ class _Matches:
     y: FloatArray
     n_y: FloatArray
     weight: FloatArray
+
+    def of(self, points: FloatArray) -> "_Matches":
+        """Those of what is around points (N, 3) of the region."""
+        kept = within(self.x, points, SAME)
+        return _Matches(*(values[kept] for values in (self.x, self.n_x, self.y, self.n_y, self.weight)))
 
     def agreement(self, T: FloatArray, tolerance: float = 0.015) -> FloatArray:
         """(H,) share of the matches that each motion (H, 4, 4) carries nearer than `tolerance`, metres."""

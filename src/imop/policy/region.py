@@ -54,6 +54,13 @@ class Region:
         """The region, then its context."""
         return self.cloud if self.context is None else concatenate([self.cloud, self.context])
 
+    def next_to(self, p: FloatArray, reach: float) -> "Region":
+        """What of the region is nearer than `reach` (metres) to its point nearest to `p` (3,), alone."""
+        points = self.cloud.points
+        anchor = points[nearest(p[None], points)[1][0, 0]]
+        near = np.linalg.norm(points - anchor, axis=1) < reach
+        return Region(self.cloud.select(near), self.weight[near], self.p_gripper_held)
+
 
 def find_regions(steps: Sequence[Transition]) -> list[Region]:
     """The region of every step of one demonstration."""

@@ -28,6 +28,8 @@ TILTED = 0.17
 SAME_MOTION = (0.001, 0.01)
 # Farther off (metres) than this is another place.
 ELSEWHERE = 0.03
+# Turned by more than this (radians) is not about alike.
+TURNED = 0.35
 # A likely motion that explains this share of what a trusted one does has to be compared with it.
 RIVAL = 0.85
 
@@ -122,7 +124,7 @@ class Inquiry:
         self._search, self._config, self._center = search, search.config, search.center
         self._judge = Judge(search.template, Surface(things, query.observation.views))
         self._refine = Refiner(things.points)
-        self.things = things
+        self.query, self.things, self.hints = query, things, hints
         self._T_repeated = query.observation.T_world_gripper @ se3.invert(search.T_world_gripper)
         self._likely = np.stack([*hints, np.eye(4), self._T_repeated])
         self._begun, self._opinion = bool(hints), opinion
@@ -170,6 +172,14 @@ class Inquiry:
         return self._ordered(
             found + [self._upright(h.T_query_support) for h in found[: self._config.righted]]
         )
+
+    def repeated(self) -> tuple[Hypothesis, ...]:
+        """The demonstrated motion of the gripper as the only hypothesis."""
+        return (self._judge.judge(self._T_repeated),)
+
+    def alike(self, T: FloatArray, other: FloatArray) -> bool:
+        """Whether two motions carry the region to about the same place, turned about alike."""
+        return bool(self._near(T[None], other)[0]) and bool(se3.rotation_distance(T, other) < TURNED)
 
     def _judged(self, motions: list[FloatArray]) -> list[Hypothesis]:
         """The best at a glance of different motions; many seeds end in the same place."""
