@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from imop.geometry import se3
+from imop.geometry.cloud import concatenate
 from imop.policy.evidence import Judge, Surface, Template, shades
 from imop.policy.region import Region
 from tests.policy.scenes import GREEN, RED, at, box, camera, moved
@@ -66,10 +67,12 @@ def test_faces_across_each_other_do_not_explain_each_other():
 def test_unseen_space_costs_less_than_empty_space():
     region = box(SIZE, RED)
     nothing = region.select(np.arange(0))
-    near, far = np.full((64, 64), 0.5, np.float32), np.full((64, 64), 2.0, np.float32)
+    near, far = np.full((64, 64), 0.5, np.float32), np.full((64, 64), 9.0, np.float32)
     upper = np.array([[0, 0, 1.0]])
-    assert Surface(nothing, {"top": camera(near)}).hides(np.zeros((1, 3)), upper).all()
-    assert not Surface(nothing, {"top": camera(far)}).hides(np.zeros((1, 3)), upper).any()
+    hidden, through = Surface(nothing, {"top": camera(near)}).seen(np.zeros((1, 3)), upper)
+    assert hidden.all() and not through.any()
+    hidden, through = Surface(nothing, {"top": camera(far)}).seen(np.zeros((1, 3)), upper)
+    assert through.all() and not hidden.any()
     half = region.select(region.points[:, 0] < 0)
     assert judged(region, half, np.eye(4), {"top": camera(near)}) > judged(
         region, half, np.eye(4), {"top": camera(far)}
@@ -83,12 +86,31 @@ def test_unseen_space_costs_less_than_empty_space():
 )
 def test_a_camera_says_nothing_about_what_it_cannot_see(point, normal):
     surface = Surface(box(SIZE, RED), {"top": camera(np.full((64, 64), 9.0, np.float32))})
-    assert surface.hides(np.array([point], dtype=float), np.array([normal], dtype=float)).all()
+    assert surface.seen(np.array([point], dtype=float), np.array([normal], dtype=float))[0].all()
 
 
 def test_no_measurement_says_nothing():
     surface = Surface(box(SIZE, RED), {"top": camera(np.full((64, 64), np.nan, np.float32))})
-    assert surface.hides(np.zeros((1, 3)), np.array([[0, 0, 1.0]])).all()
+    hidden, through = surface.seen(np.zeros((1, 3)), np.array([[0, 0, 1.0]]))
+    assert hidden.all() and not through.any()
+
+
+def test_an_absent_handle_costs_more_than_its_share_but_absent_surroundings_do_not():
+    mug, handle = box(SIZE, RED), box((0.02, 0.02, 0.02), RED, at(0.08, 0.0))
+    whole = concatenate([mug, handle])
+    views = {"top": camera(np.full((64, 64), 9.0, np.float32))}
+
+    def lost(region):
+        scores = [
+            Judge(Template(region, VIEWS), Surface(box(SIZE, RED, seed=1), seen)).judge(np.eye(4)).score
+            for seen in ({}, views)
+        ]
+        return scores[0] - scores[1]
+
+    own = lost(Region(whole, np.ones(len(whole)), np.zeros((0, 3)), firm=True))
+    beside = lost(Region(mug, np.ones(len(mug)), np.zeros((0, 3)), handle, firm=True))
+    assert own > len(handle) / len(whole)
+    assert beside < own / 2
 
 
 def test_empty_query_explains_nothing():

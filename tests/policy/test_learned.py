@@ -65,7 +65,7 @@ GRAY = (0.5, 0.5, 0.5)
 def chain(side):
     """Links that wind to one `side` and back, with a red and a blue end; the pose that grasps the red one."""
     s = np.linspace(0.0, 1.0, 17)
-    heading = side * 1.4 * np.cos(2 * np.pi * s)
+    heading = side * 1.1 * np.cos(2 * np.pi * s)
     xy = np.cumsum(0.026 * np.stack([np.cos(heading), np.sin(heading)], axis=1), axis=0) - 0.1
     colors = [RED, *[GRAY] * (len(s) - 2), BLUE]
     links = [

@@ -1,7 +1,7 @@
 """How well a moved region explains an observed scene: points, normals, colours and free space."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,7 @@ class Tolerances:
             inside out by a motion, so little is lost.
         grazing: cosine of the angle to its normal from which a camera sees a face at all.
         hidden: what a point that no camera can see costs, as a share of an unexplained one.
+        absent: the same of a point of a firm region that a camera sees through, with nothing around it.
         around: observed points this near to the moved region have to be explained by it, metres.
         backward: share of the score that these points decide.
         context: share of the forward score that the region's surroundings decide.
@@ -42,6 +43,7 @@ class Tolerances:
     behind: float = 0.9
     grazing: float = 0.25
     hidden: float = 0.5
+    absent: float = 3.0
     around: float = 0.04
     backward: float = 0.25
     context: float = 0.3
@@ -89,6 +91,12 @@ class Surface:
         agreement = np.where(found, np.exp(-0.5 * error) * facing, 0.0)
         return agreement, index
 
+    def colorless(self) -> "Surface":
+        """The same shape, all of one colour."""
+        views = {str(number): view for number, view in enumerate(self._views)}
+        gray = replace(self.cloud, colors=np.zeros_like(self.cloud.colors))
+        return Surface(gray, views, self.tolerances)
+
     def near(self, points: FloatArray) -> BoolArray:
         """(M,) True for points around this surface."""
         if self._tree is None:
@@ -96,35 +104,53 @@ class Surface:
         distance, _ = self._tree.query(points, distance_upper_bound=self.tolerances.around)
         return np.isfinite(distance)
 
-    def hides(self, points: FloatArray, normals: FloatArray) -> BoolArray:
+    def seen(self, points: FloatArray, normals: FloatArray) -> tuple[BoolArray, BoolArray]:
         """(M,) True where no view can say that a face at the point, with its normal, is not there.
 
-        A view can if the face lies in its image and turns to it, and nothing nearer stands before it.
+        A view can if the face lies in its image and turns to it, and nothing nearer stands before it. And
+        (M,) True where a view sees through the point to what is farther away.
         """
-        hidden = np.ones(len(points), dtype=bool)
+        hidden, through = np.ones(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
         for view in self._views:
             to_camera = view.T_world_camera[:3, 3] - points
             distance = np.maximum(np.linalg.norm(to_camera, axis=1), 1e-9)
             slant = np.einsum("mk,mk->m", to_camera, normals) / distance
             (column, row), z, inside = (part.T for part in project(view, points))
             depth = view.depth[row, column]
-            clear = np.isfinite(depth) & (depth > z - self.tolerances.depth)
-            hidden &= ~(inside & clear & (slant > self.tolerances.grazing))
-        return hidden
+            beyond = np.where(inside & np.isfinite(depth), depth - z, -np.inf)
+            hidden &= ~((beyond > -self.tolerances.depth) & (slant > self.tolerances.grazing))
+            through |= beyond > self.tolerances.depth
+        return hidden, through
 
-    def possible(self, cloud: PointCloud, weight: FloatArray, explained: FloatArray) -> FloatArray:
-        """(M,) weights of a `cloud` with normals; hidden points that nothing `explained` (M,) count less."""
+    def possible(
+        self, cloud: PointCloud, weight: FloatArray, explained: FloatArray, firm: BoolArray | None = None
+    ) -> FloatArray:
+        """(M,) weights of a `cloud` with normals after what was `explained` (M,) of it.
+
+        Unexplained points that are hidden count less; of the `firm` ones, (M,), which cannot have moved on
+        their own, those that are seen to be absent count more.
+        """
         open_points = np.flatnonzero(explained < 0.5)
         doubtful = cloud.select(open_points)
         assert doubtful.normals is not None
-        hidden = self.hides(doubtful.points, doubtful.normals)
+        hidden, through = self.seen(doubtful.points, doubtful.normals)
         possible = weight.copy()
         possible[open_points[hidden]] *= self.tolerances.hidden
+        if firm is not None:
+            absent = through & firm[open_points] & (explained[open_points] == 0.0)
+            possible[open_points[absent]] *= self.tolerances.absent
         return possible
 
-    def share(self, cloud: PointCloud, weight: FloatArray, T: FloatArray, explained: FloatArray) -> float:
-        """Weighted share 0 .. 1 of the moved `cloud` that is `explained` (M,); hidden points cost less."""
-        possible = self.possible(moved(cloud, T), weight, explained)
+    def share(
+        self,
+        cloud: PointCloud,
+        weight: FloatArray,
+        T: FloatArray,
+        explained: FloatArray,
+        firm: BoolArray | None = None,
+    ) -> float:
+        """Weighted share 0 .. 1 of the moved `cloud` that is `explained` (M,); see `possible`."""
+        possible = self.possible(moved(cloud, T), weight, explained, firm)
         return float(np.clip((weight * explained).sum() / max(possible.sum(), 1e-9), 0.0, 1.0))
 
 
@@ -153,8 +179,10 @@ class Template:
         self.whole = self.surface if region.context is None else Surface(region.whole, views)
         self.coarse, self.coarse_weight = self._points(region, 120)
         self.fine, self.fine_weight = self._points(region, 1000)
-        # The fine points beyond these are of the context.
+        # The points beyond these are of the context, which may have moved on its own.
         self.size = min(1000, len(region.cloud))
+        self.coarse_firm = region.firm & (np.arange(len(self.coarse)) < min(120, len(region.cloud)))
+        self.fine_firm = region.firm & (np.arange(len(self.fine)) < self.size)
 
     def _points(self, region: Region, count: int) -> tuple[PointCloud, FloatArray]:
         """At most `count` points of the region and half as many of its context, and their weights."""
@@ -188,19 +216,22 @@ class Judge:
         copies = moved(self._template.coarse, T_query_support)
         weight = np.tile(self._template.coarse_weight, len(T_query_support))
         explained, _ = self._query.explain(copies, np.eye(4))
-        possible = self._query.possible(copies, weight, explained)
+        firm = np.tile(self._template.coarse_firm, len(T_query_support))
+        possible = self._query.possible(copies, weight, explained, firm)
         got, wanted = ((v.reshape(len(T_query_support), -1)).sum(1) for v in (weight * explained, possible))
         scores: FloatArray = np.clip(got / np.maximum(wanted, 1e-9), 0.0, 1.0)
         return scores
 
     def judge(self, T_query_support: FloatArray) -> Hypothesis:
         """The motion as a hypothesis, scored in both directions."""
-        fine = self._template.fine
+        template, fine = self._template, self._template.fine
         explained, counterpart = self._query.explain(fine, T_query_support)
-        forward = self._query.share(fine, self._template.fine_weight, T_query_support, explained)
+        forward = self._query.share(
+            fine, template.fine_weight, T_query_support, explained, template.fine_firm
+        )
         part = self._query.tolerances.backward
         score = (1 - part) * forward + part * self._backward(se3.invert(T_query_support))
-        good = np.flatnonzero(explained[: self._template.size] > 0.3)
+        good = np.flatnonzero(explained[: template.size] > 0.3)
         p_query = self._query.cloud.points[counterpart[good]]
         return Hypothesis(T_query_support, score, fine.points[good], p_query)
 

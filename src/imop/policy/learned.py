@@ -107,7 +107,9 @@ class LearnedStep:
         if self._region.context is not None:
             self._middles.append(middle(self._region.whole.points))
         self._search = Search(matcher.search, step.before, self._region)
-        self._turns = equal_turns(self._search.template.surface, self._middles[0])
+        surface = self._search.template.surface
+        self._turns = equal_turns(surface, self._middles[0])
+        self._turns_of_shape = equal_turns(surface.colorless(), self._middles[0])
         self._part = self._region.next_to(step.action.T_world_gripper[:3, 3], NEXT_TO)
         self._search_part = Search(matcher.search, step.before, self._part)
         tip = step.before.observation.T_world_gripper[None, :3, 3]
@@ -185,8 +187,11 @@ class LearnedStep:
         return [*hints, *fit] if agreed else list(hints)
 
     def _opinion(self, m: "_Matches", T: FloatArray) -> FloatArray:
-        """(H,) share of the matches that speak for motions (H, 4, 4), in any of the equal turns."""
-        turned = (T[:, None] @ self._turns).reshape(-1, 4, 4)
+        """(H,) share of the matches that speak for motions (H, 4, 4), in any of the turns of equal shape.
+
+        Of a round jar the networks match any side to any; its label is for the judge.
+        """
+        turned = (T[:, None] @ self._turns_of_shape).reshape(-1, 4, 4)
         support: FloatArray = m.agreement(turned, LOOSE).reshape(len(T), -1).max(axis=1)
         return support
 
@@ -268,4 +273,4 @@ def _dense(
     rest = cloud.select(standing & ~member & ~in_hand)
     around = within(rest.points, region.points, AROUND)
     context = rest.select(around) if around.any() else None
-    return Region(region, weight[owner[member]], p_gripper_held, context)
+    return Region(region, weight[owner[member]], p_gripper_held, context, firm=True)

@@ -42,12 +42,15 @@ class Region:
             region; they have to be left out of the query as well.
         context: what stood around the region. It may have moved on its own, so it only tells apart what the
             region alone does not: the two ends of a box without its latch.
+        firm: whether its points are meant to move as one, so that one seen to be absent speaks against
+            a motion. A cluster may have joints and neighbours.
     """
 
     cloud: PointCloud
     weight: FloatArray
     p_gripper_held: FloatArray
     context: PointCloud | None = None
+    firm: bool = False
 
     @cached_property
     def whole(self) -> PointCloud:
@@ -59,7 +62,7 @@ class Region:
         points = self.cloud.points
         anchor = points[nearest(p[None], points)[1][0, 0]]
         near = np.linalg.norm(points - anchor, axis=1) < reach
-        return Region(self.cloud.select(near), self.weight[near], self.p_gripper_held)
+        return Region(self.cloud.select(near), self.weight[near], self.p_gripper_held, firm=self.firm)
 
 
 def find_regions(steps: Sequence[Transition]) -> list[Region]:

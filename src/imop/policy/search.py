@@ -28,6 +28,8 @@ TILTED = 0.17
 SAME_MOTION = (0.001, 0.01)
 # Farther off (metres) than this is another place.
 ELSEWHERE = 0.03
+# Turned by this (radians) or more against the demonstrated motion is another motion.
+OTHERWISE = 1.0
 # Turned by more than this (radians) is not about alike.
 TURNED = 0.35
 # A likely motion that explains this share of what a trusted one does has to be compared with it.
@@ -46,7 +48,7 @@ class SearchConfig:
         turned: how many of the best are tried half a turn off, too: long things have two ends.
         turn: share of its score that a hypothesis loses for half a turn off the demonstrated motion.
         tilt: share that it loses for tilting things by `TILTED` or more.
-        change: share that it loses for another place than the demonstrated motion leads to.
+        change: share that it loses for another pose than the demonstrated motion leads to, once begun.
         sure: score from which a trusted motion needs no search.
         opinion: what full support by the matcher's opinion adds to the score when motions are compared.
     """
@@ -257,7 +259,8 @@ class Inquiry:
         turn = float(se3.rotation_distance(T, self._T_repeated)) / np.pi
         tilt = min(float(np.arccos(np.clip(T[2, 2], -1.0, 1.0))) / TILTED, 1.0)
         p_moved, p_repeated = se3.apply(np.stack([T, self._T_repeated]), self._center[None])[:, 0]
-        away = min(float(np.linalg.norm(p_moved - p_repeated)) / ELSEWHERE, 1.0) if self._begun else 0.0
+        away = max(float(np.linalg.norm(p_moved - p_repeated)) / ELSEWHERE, turn * np.pi / OTHERWISE)
+        away = min(away, 1.0) if self._begun else 0.0
         return hypothesis.score * (1 - cost.turn * turn - cost.tilt * tilt - cost.change * away)
 
 
