@@ -24,7 +24,7 @@ from imop.networks.region import StepBatch, one_step
 from imop.policy.contacts import GRASP, SAME, find_contacts, is_open
 from imop.policy.hypotheses import agreement, sample_motions
 from imop.policy.matcher import Hypothesis, Scene, Transition
-from imop.policy.objects import find_objects
+from imop.policy.objects import connected, find_objects
 from imop.policy.region import Region
 from imop.policy.search import Inquiry, Search, SearchConfig, middle, upright_motions
 from imop.policy.symmetry import equal_turns
@@ -36,7 +36,7 @@ FEWEST = 8
 LETS_GO = 0.8
 # Matches nearer than this to where a motion carries them speak for it, metres.
 LOOSE = 0.03
-# What stands this near to the region (metres) is its context.
+# What is connected to the region, this near to it (metres), is its context.
 AROUND = 0.1
 # A region that no motion explains better than this may have bent. What of it is within `NEXT_TO` metres of
 # where the gripper goes has not, and is found instead if its matches support the whole less than this share
@@ -107,9 +107,7 @@ class LearnedStep:
         if self._region.context is not None:
             self._middles.append(middle(self._region.whole.points))
         self._search = Search(matcher.search, step.before, self._region)
-        surface = self._search.template.surface
-        self._turns = equal_turns(surface, self._middles[0])
-        self._turns_of_shape = equal_turns(surface.colorless(), self._middles[0])
+        self._turns = equal_turns(self._search.template.surface.colorless(), self._middles[0])
         self._part = self._region.next_to(step.action.T_world_gripper[:3, 3], NEXT_TO)
         self._search_part = Search(matcher.search, step.before, self._part)
         tip = step.before.observation.T_world_gripper[None, :3, 3]
@@ -191,7 +189,7 @@ class LearnedStep:
 
         Of a round jar the networks match any side to any; its label is for the judge.
         """
-        turned = (T[:, None] @ self._turns_of_shape).reshape(-1, 4, 4)
+        turned = (T[:, None] @ self._turns).reshape(-1, 4, 4)
         support: FloatArray = m.agreement(turned, LOOSE).reshape(len(T), -1).max(axis=1)
         return support
 
@@ -270,7 +268,9 @@ def _dense(
     else:
         in_hand, p_gripper_held = np.zeros(len(cloud), dtype=bool), p_gripper_held[:0]
     region = cloud.select(member)
-    rest = cloud.select(standing & ~member & ~in_hand)
-    around = within(rest.points, region.points, AROUND)
-    context = rest.select(around) if around.any() else None
+    free = np.flatnonzero(standing & ~in_hand | member)
+    labels, own = connected(cloud.points[free]), member[free]
+    # What only stands by says nothing about the region.
+    around = ~own & np.isin(labels, labels[own]) & within(cloud.points[free], region.points, AROUND)
+    context = cloud.select(free[around]) if around.any() else None
     return Region(region, weight[owner[member]], p_gripper_held, context, firm=True)

@@ -40,8 +40,8 @@ class Region:
         weight: (M,) in (0, 1], larger near the contact.
         p_gripper_held: (H, 3) points of the held object in the gripper's frame, if it is not part of the
             region; they have to be left out of the query as well.
-        context: what stood around the region. It may have moved on its own, so it only tells apart what the
-            region alone does not: the two ends of a box without its latch.
+        context: what the region is connected to. It may have moved on its own, so it only tells apart what
+            the region alone does not: the two ends of a box without its latch.
         firm: whether its points are meant to move as one, so that one seen to be absent speaks against
             a motion. A cluster may have joints and neighbours.
     """
