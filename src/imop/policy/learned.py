@@ -162,7 +162,10 @@ class LearnedStep:
         if self._in_hand:
             part = closer.repeated()
         else:
-            part = closer.search(np.concatenate([self._sampled(near), self._upright(near, inquiry)]))
+            seeds = np.concatenate([self._sampled(near), self._upright(near, inquiry)])
+            if not len(seeds):
+                return whole
+            part = closer.search(seeds)
         motions = np.stack([part[0].T_query_support, whole[0].T_query_support])
         if closer.alike(*motions):
             return whole
@@ -214,7 +217,7 @@ class LearnedStep:
                 seeds.append(upright_motions(x, y[None], self._matcher.turns))
                 place = middle(points[labels == label])[None]
                 seeds += [upright_motions(center, place, self._matcher.turns) for center in self._middles]
-        return np.concatenate(seeds)
+        return np.concatenate([np.zeros((0, 4, 4)), *seeds])
 
 
 @dataclass(frozen=True, eq=False)
