@@ -177,23 +177,25 @@ class Template:
     def __init__(self, region: Region, views: Mapping[str, CameraView]) -> None:
         self.surface = Surface(region.cloud, views)
         self.whole = self.surface if region.context is None else Surface(region.whole, views)
-        self.coarse, self.coarse_weight = self._points(region, 120)
-        self.fine, self.fine_weight = self._points(region, 1000)
+        self.coarse, self.coarse_weight, coarse_size = self._points(region, 120)
+        self.fine, self.fine_weight, self.size = self._points(region, 1000)
         # The points beyond these are of the context, which may have moved on its own.
-        self.size = min(1000, len(region.cloud))
-        self.coarse_firm = region.firm & (np.arange(len(self.coarse)) < min(120, len(region.cloud)))
+        self.coarse_firm = region.firm & (np.arange(len(self.coarse)) < coarse_size)
         self.fine_firm = region.firm & (np.arange(len(self.fine)) < self.size)
 
-    def _points(self, region: Region, count: int) -> tuple[PointCloud, FloatArray]:
-        """At most `count` points of the region and half as many of its context, and their weights."""
+    def _points(self, region: Region, count: int) -> tuple[PointCloud, FloatArray, int]:
+        """At most `count` points of the region, then half as many of its context; their weights.
+
+        And how many of them are of the region.
+        """
         chosen = farthest_points(region.cloud.points, count)
         cloud, weight = region.cloud.select(chosen), region.weight[chosen]
         if region.context is None:
-            return cloud, weight
+            return cloud, weight, len(chosen)
         near = region.context.select(farthest_points(region.context.points, count // 2))
         share = self.surface.tolerances.context
         each = share / (1 - share) * weight.sum() / len(near)
-        return concatenate([cloud, near]), np.concatenate([weight, np.full(len(near), each)])
+        return concatenate([cloud, near]), np.concatenate([weight, np.full(len(near), each)]), len(chosen)
 
 
 class Judge:

@@ -8,7 +8,7 @@ propose motions, and what the cameras saw decides between them and refines the b
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 import torch
@@ -109,9 +109,14 @@ class LearnedStep:
         self._search = Search(matcher.search, step.before, self._region)
         self._turns = equal_turns(self._search.template.surface.colorless(), self._middles[0])
         self._part = self._region.next_to(step.action.T_world_gripper[:3, 3], NEXT_TO)
-        self._search_part = Search(matcher.search, step.before, self._part)
+        self._before = step.before
         tip = step.before.observation.T_world_gripper[None, :3, 3]
         self._in_hand = holding and bool(within(tip, self._part.cloud.points, GRASP)[0])
+
+    @cached_property
+    def _search_part(self) -> Search:
+        """Few steps need it, and it takes as long to prepare as that of the region."""
+        return Search(self._matcher.search, self._before, self._part)
 
     def _inside(self, probability: Tensor) -> Tensor:
         """(R,) points of the region, in order of their index; the likeliest few if there seems to be none."""
