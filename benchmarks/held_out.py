@@ -35,6 +35,7 @@ from imop.policy.learned import LearnedMatcher
 from imop.policy.matcher import Matcher, Transition
 from imop.policy.matcher import Scene as Seen
 from imop.policy.registration import RegistrationMatcher
+from imop.policy.textbook import TextbookMatcher
 from imop.sim.robot import panda_self_filter
 from imop.training.depth_noise import DepthNoise
 from imop.training.families import HELD_OUT
@@ -53,7 +54,7 @@ class Options:
     Attributes:
         pairs: how many steps.
         seed: of the scenes.
-        methods: learned, registration, or both, joined by commas.
+        methods: any of learned, registration and textbook (needs the extra baselines), joined by commas.
         weights: of the learned matcher.
         json: where the results go.
         jobs: processes.
@@ -82,7 +83,9 @@ class Row:
 
 
 def make_matcher(method: str, weights: Path) -> Matcher:
-    return LearnedMatcher(load_model(weights)) if method == "learned" else RegistrationMatcher()
+    if method == "learned":
+        return LearnedMatcher(load_model(weights))
+    return TextbookMatcher() if method == "textbook" else RegistrationMatcher()
 
 
 def observe(scene: Scene, rng: np.random.Generator) -> tuple[Take, list[Observation]]:

@@ -52,7 +52,8 @@ class Options:
         split: which of its tasks.
         tasks: comma-separated names within the suite; all of the split by default.
         demos: a folder in RLBench's layout instead of a suite: an episode, a task, or several tasks.
-        methods: comma-separated: learned, registration, replay, oracle. By default all, but no oracle on
+        methods: comma-separated: learned, registration, textbook (FPFH, RANSAC and ICP of Open3D, extra
+            baselines), replay, oracle. By default all that need no extra, but no oracle on
             recordings, which do not tell where objects are.
         scenes: per task, with its variations in turn.
         seed: of the first scene.

@@ -135,8 +135,9 @@ def evaluate(
         suite: which suite.
         split: base, novel, cross_object or all.
         tasks: names within the split; all if none is given.
-        methods: any of replay, registration, learned, routed (learned, and the routing network may go back
-            to a step), oracle (true object poses), expert, joined by commas.
+        methods: any of replay, textbook (FPFH, RANSAC and ICP of Open3D, extra baselines), registration,
+            learned, routed (learned, and the routing network may go back to a step), oracle (true object
+            poses), expert, joined by commas.
         episodes: scenes per task, spread over its variations.
         seed: first seed of the scenes.
         instance: seed of the objects' shapes, sizes and colours.

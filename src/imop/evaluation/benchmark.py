@@ -17,7 +17,7 @@ from imop.tasks.expert import perform
 from imop.tasks.layout import NoRoom
 from imop.types import Demonstration
 
-METHODS = ("replay", "registration", "learned", "routed", "oracle", "expert")
+METHODS = ("replay", "textbook", "registration", "learned", "routed", "oracle", "expert")
 
 NOTES = (
     "One demonstration per task and variation, from a scene that is never tested.",

@@ -10,8 +10,10 @@ from imop.evaluation.splits import SPLITS, chosen_tasks
 from imop.geometry.perception import Perception
 from imop.networks.model import BUNDLED
 from imop.policy.baselines import ReplayPolicy
+from imop.policy.matcher import Matcher
 from imop.policy.one_shot import OneShotPolicy
 from imop.policy.registration import RegistrationMatcher
+from imop.policy.textbook import TextbookMatcher
 from imop.sim.kinematics import reachable
 from imop.sim.robot import panda_self_filter
 from imop.sim.world import World
@@ -96,20 +98,21 @@ def make_policy(
     """A fresh policy by the name of its method.
 
     Args:
-        method: learned, routed (learned, and the routing network chooses the step), replay, registration or
-            oracle.
+        method: learned, routed (learned, and the routing network chooses the step), replay, registration,
+            textbook or oracle.
         world: the simulated world, which only the oracle reads.
         min_confidence: of the one-shot policies.
         weights: folder of the learned policy's weights; by default the bundled ones.
 
     Raises:
         InvalidInput: for an unknown method, or an oracle without a world.
+        MissingExtra: for textbook without Open3D.
     """
     if method == "replay":
         return ReplayPolicy()
     perception = Perception(panda_self_filter().is_robot)
-    if method == "registration":
-        matcher = RegistrationMatcher()
+    if method in ("registration", "textbook"):
+        matcher: Matcher = RegistrationMatcher() if method == "registration" else TextbookMatcher()
         return OneShotPolicy(matcher, perception, min_confidence=min_confidence, feasible=reachable)
     if method in ("learned", "routed"):
         return OneShotPolicy.from_pretrained(
@@ -117,7 +120,7 @@ def make_policy(
         )
     if method == "oracle" and world is not None:
         return OraclePolicy(world)
-    raise InvalidInput("method", method, "learned, routed, replay, registration, or (in simulation) oracle")
+    raise InvalidInput("method", method, "learned, routed, replay, registration, textbook, or (in simulation) oracle")
 
 
 def most_actions(method: str, demonstration: Demonstration, task: Task) -> int:
