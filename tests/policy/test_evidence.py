@@ -10,7 +10,7 @@ from imop.policy.region import Region
 from tests.policy.scenes import GREEN, RED, at, box, camera, moved
 
 SIZE = (0.08, 0.05, 0.06)
-VIEWS = {"top": camera()}
+VIEWS = (camera(),)
 
 
 def template(region):
@@ -69,14 +69,12 @@ def test_unseen_space_costs_less_than_empty_space():
     nothing = region.select(np.arange(0))
     near, far = np.full((64, 64), 0.5, np.float32), np.full((64, 64), 9.0, np.float32)
     upper = np.array([[0, 0, 1.0]])
-    hidden, through = Surface(nothing, {"top": camera(near)}).seen(np.zeros((1, 3)), upper)
+    hidden, through = Surface(nothing, (camera(near),)).seen(np.zeros((1, 3)), upper)
     assert hidden.all() and not through.any()
-    hidden, through = Surface(nothing, {"top": camera(far)}).seen(np.zeros((1, 3)), upper)
+    hidden, through = Surface(nothing, (camera(far),)).seen(np.zeros((1, 3)), upper)
     assert through.all() and not hidden.any()
     half = region.select(region.points[:, 0] < 0)
-    assert judged(region, half, np.eye(4), {"top": camera(near)}) > judged(
-        region, half, np.eye(4), {"top": camera(far)}
-    )
+    assert judged(region, half, np.eye(4), (camera(near),)) > judged(region, half, np.eye(4), (camera(far),))
 
 
 @pytest.mark.parametrize(
@@ -85,12 +83,12 @@ def test_unseen_space_costs_less_than_empty_space():
     ids=["turned away", "edge on", "outside the image", "behind the camera"],
 )
 def test_a_camera_says_nothing_about_what_it_cannot_see(point, normal):
-    surface = Surface(box(SIZE, RED), {"top": camera(np.full((64, 64), 9.0, np.float32))})
+    surface = Surface(box(SIZE, RED), (camera(np.full((64, 64), 9.0, np.float32)),))
     assert surface.seen(np.array([point], dtype=float), np.array([normal], dtype=float))[0].all()
 
 
 def test_no_measurement_says_nothing():
-    surface = Surface(box(SIZE, RED), {"top": camera(np.full((64, 64), np.nan, np.float32))})
+    surface = Surface(box(SIZE, RED), (camera(np.full((64, 64), np.nan, np.float32)),))
     hidden, through = surface.seen(np.zeros((1, 3)), np.array([[0, 0, 1.0]]))
     assert hidden.all() and not through.any()
 
@@ -98,12 +96,12 @@ def test_no_measurement_says_nothing():
 def test_an_absent_handle_costs_more_than_its_share_but_absent_surroundings_do_not():
     mug, handle = box(SIZE, RED), box((0.02, 0.02, 0.02), RED, at(0.08, 0.0))
     whole = concatenate([mug, handle])
-    views = {"top": camera(np.full((64, 64), 9.0, np.float32))}
+    views = (camera(np.full((64, 64), 9.0, np.float32)),)
 
     def lost(region):
         scores = [
             Judge(Template(region, VIEWS), Surface(box(SIZE, RED, seed=1), seen)).judge(np.eye(4)).score
-            for seen in ({}, views)
+            for seen in ((), views)
         ]
         return scores[0] - scores[1]
 

@@ -6,6 +6,7 @@ from imop.geometry import se3
 from imop.policy.objects import find_objects
 from imop.policy.region import Region
 from imop.policy.search import Inquiry, Search, SearchConfig
+from imop.policy.things import Things
 from tests.policy.scenes import RED, above, at, box, scene
 
 HOME = above(0.0, -0.3, 1.2)
@@ -19,7 +20,8 @@ def inquiry(poses, hints=(), opinion=None, weight=0.01):
     region = Region(cloud, np.ones(len(cloud)), np.zeros((0, 3)))
     search = Search(SearchConfig(turned=2, opinion=weight), scene([cloud], HOME), region)
     query = scene([box(SIZE, RED, pose, seed=1 + k) for k, pose in enumerate(poses)], HOME)
-    return Inquiry(search, query, find_objects(query.cloud, query.ground.plane).cloud, hints, opinion)
+    things = Things(query, find_objects(query.cloud, query.ground.plane).cloud)
+    return Inquiry(search, things, hints, opinion)
 
 
 def test_a_motion_that_is_nearly_right_is_confirmed_and_mended():

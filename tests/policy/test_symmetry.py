@@ -8,7 +8,7 @@ from imop.policy.evidence import Surface
 from imop.policy.symmetry import equal_turns, half_turn
 from tests.policy.scenes import RED, TABLE, at, box, camera, colored
 
-VIEWS = {"above": camera()}
+VIEWS = (camera(),)
 CENTER = np.array([0.1, 0.1, TABLE])
 
 

@@ -120,7 +120,8 @@ def make_policy(
         )
     if method == "oracle" and world is not None:
         return OraclePolicy(world)
-    raise InvalidInput("method", method, "learned, routed, replay, registration, textbook, or (in simulation) oracle")
+    known = "learned, routed, replay, registration, textbook, or (in simulation) oracle"
+    raise InvalidInput("method", method, known)
 
 
 def most_actions(method: str, demonstration: Demonstration, task: Task) -> int:

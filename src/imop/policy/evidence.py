@@ -1,7 +1,8 @@
 """How well a moved region explains an observed scene: points, normals, colours and free space."""
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,11 +60,11 @@ class Surface:
     """What was observed of a scene or of a part of it: a cloud with normals and the views it came from."""
 
     def __init__(
-        self, cloud: PointCloud, views: Mapping[str, CameraView], tolerances: Tolerances | None = None
+        self, cloud: PointCloud, views: Sequence[CameraView], tolerances: Tolerances | None = None
     ) -> None:
         self.cloud = cloud
         self.tolerances = tolerances or Tolerances()
-        self._views = list(views.values())
+        self._views = views
         self._tree = cKDTree(cloud.points) if len(cloud) else None
         self._shades = shades(cloud.colors)
 
@@ -93,9 +94,13 @@ class Surface:
 
     def colorless(self) -> "Surface":
         """The same shape, all of one colour."""
-        views = {str(number): view for number, view in enumerate(self._views)}
         gray = replace(self.cloud, colors=np.zeros_like(self.cloud.colors))
-        return Surface(gray, views, self.tolerances)
+        return Surface(gray, self._views, self.tolerances)
+
+    @cached_property
+    def sample(self) -> PointCloud:
+        """At most 1000 of the points, evenly spread."""
+        return self.cloud.select(farthest_points(self.cloud.points, 1000))
 
     def near(self, points: FloatArray) -> BoolArray:
         """(M,) True for points around this surface."""
@@ -174,7 +179,7 @@ class Template:
         views: of the demonstrated scene.
     """
 
-    def __init__(self, region: Region, views: Mapping[str, CameraView]) -> None:
+    def __init__(self, region: Region, views: Sequence[CameraView]) -> None:
         self.surface = Surface(region.cloud, views)
         self.whole = self.surface if region.context is None else Surface(region.whole, views)
         self.coarse, self.coarse_weight, coarse_size = self._points(region, 120)
@@ -211,7 +216,6 @@ class Judge:
 
     def __init__(self, template: Template, query: Surface) -> None:
         self._template, self._query = template, query
-        self._around = query.cloud.select(farthest_points(query.cloud.points, 1000))
 
     def glance(self, T_query_support: FloatArray) -> FloatArray:
         """(H,) quick forward scores, 0 .. 1, of motions (H, 4, 4)."""
@@ -238,7 +242,7 @@ class Judge:
         return Hypothesis(T_query_support, score, fine.points[good], p_query)
 
     def _backward(self, T_support_query: FloatArray) -> float:
-        near = self._template.surface.near(se3.apply(T_support_query, self._around.points))
-        around = self._around.select(near)
+        sample = self._query.sample
+        around = sample.select(self._template.surface.near(se3.apply(T_support_query, sample.points)))
         explained, _ = self._template.whole.explain(around, T_support_query)
         return self._template.whole.share(around, np.ones(len(around)), T_support_query, explained)

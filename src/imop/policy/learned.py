@@ -25,9 +25,11 @@ from imop.policy.contacts import GRASP, SAME, find_contacts, is_open
 from imop.policy.hypotheses import agreement, sample_motions
 from imop.policy.matcher import Hypothesis, Scene, Transition
 from imop.policy.objects import connected, find_objects
+from imop.policy.refine import SMALLEST
 from imop.policy.region import Region
 from imop.policy.search import Inquiry, Search, SearchConfig, middle, upright_motions
 from imop.policy.symmetry import equal_turns
+from imop.policy.things import Things, without_held
 from imop.types import FloatArray
 
 # A region of fewer points cannot be matched.
@@ -137,18 +139,18 @@ class LearnedStep:
         seen = build_graph(query.cloud, model.config.graph, query.ground)
         with torch.inference_mode():
             found = model.matching(self._graph, self._chosen, seen, self._described)
-        things = query.cloud.select(~query.ground.bare)
-        things = self._search.without_held(query, things)
-        if len(things) < 5:
+        standing = without_held(query.cloud.select(~query.ground.bare), query, self._region)
+        if len(standing) < 5:
             return ()
         matches = self._matches(found, seen)
         fit = reposition(found.last, found.p_region, found.p_query).double().numpy()
-        inquiry = Inquiry(self._search, query, things, hints, partial(self._opinion, matches))
+        things = Things(query, standing)
+        inquiry = Inquiry(self._search, things, hints, partial(self._opinion, matches))
         trusted = self._trusted(matches, fit, hints)
         confirmed = inquiry.confirm(np.stack(trusted)) if trusted else ()
         if confirmed:
             return confirmed
-        seeds = np.concatenate([fit, self._sampled(matches), self._upright(matches, inquiry)])
+        seeds = np.concatenate([fit, self._sampled(matches), self._upright(matches, things)])
         whole = inquiry.search(seeds)
         return whole if whole[0].score > BENT else self._unbent(matches, inquiry, whole)
 
@@ -160,14 +162,14 @@ class LearnedStep:
         A part in the hand has moved as the gripper has.
         """
         near = matches.of(self._part.cloud.points)
-        if len(near.x) < 3:
+        if len(near.x) < 3 or len(self._part.cloud) < SMALLEST:
             return whole
         opinion = partial(self._opinion, near)
-        closer = Inquiry(self._search_part, inquiry.query, inquiry.things, inquiry.hints, opinion)
+        closer = Inquiry(self._search_part, inquiry.things, inquiry.hints, opinion)
         if self._in_hand:
             part = closer.repeated()
         else:
-            seeds = np.concatenate([self._sampled(near), self._upright(near, inquiry)])
+            seeds = np.concatenate([self._sampled(near), self._upright(near, inquiry.things)])
             if not len(seeds):
                 return whole
             part = closer.search(seeds)
@@ -206,12 +208,12 @@ class LearnedStep:
         samples, seed = self._matcher.samples, self._matcher.seed
         return sample_motions(m.x, m.y, m.n_x, m.n_y, m.weight, samples=samples, seed=seed)
 
-    def _upright(self, m: "_Matches", inquiry: Inquiry) -> FloatArray:
+    def _upright(self, m: "_Matches", things: Things) -> FloatArray:
         """(H, 4, 4) motions, in every turn, to the things that most of the region was matched to.
 
         Where something is, the matches say long before they say how it is turned.
         """
-        points, labels = inquiry.things.points, inquiry.labels
+        points, labels = things.cloud.points, things.labels
         thing = labels[nearest(m.y, points)[1][:, 0]]
         weights = np.bincount(thing, weights=m.weight, minlength=labels.max() + 1)
         seeds = []

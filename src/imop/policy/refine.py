@@ -9,6 +9,8 @@ from imop.types import FloatArray
 
 STAGES = (0.04, 0.02, 0.01)
 FINEST = (0.005,)
+# small_gicp takes fewer points for a mistake.
+SMALLEST = 10
 
 
 class Refiner:

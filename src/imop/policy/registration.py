@@ -12,6 +12,7 @@ from imop.policy.matcher import Hypothesis, Scene, Transition
 from imop.policy.objects import connected, find_objects
 from imop.policy.region import Region, find_regions
 from imop.policy.search import Inquiry, Search, SearchConfig, middle, upright_motions
+from imop.policy.things import Things, without_held
 from imop.types import FloatArray
 
 
@@ -68,11 +69,11 @@ class RegisteredStep:
         """Where the region is in the query, best first; see `PreparedStep.match`."""
         if len(query.cloud) < 5:
             return ()
-        things = self._search.without_held(query, find_objects(query.cloud, query.ground.plane).cloud)
+        things = without_held(find_objects(query.cloud, query.ground.plane).cloud, query, self._region)
         if len(things) < 5:
             return ()
         seeds = np.concatenate([self._sampled(things), self._upright(things)])
-        return Inquiry(self._search, query, things, hints).search(seeds)
+        return Inquiry(self._search, Things(query, things), hints).search(seeds)
 
     def _sampled(self, things: PointCloud) -> FloatArray:
         """(H, 4, 4) motions from matched descriptors."""

@@ -2,22 +2,20 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud, farthest_points
-from imop.geometry.neighbours import nearest, within
-from imop.policy.contacts import SAME
-from imop.policy.evidence import Judge, Surface, Template
+from imop.geometry.cloud import farthest_points
+from imop.geometry.neighbours import nearest
+from imop.policy.evidence import Judge, Template
 from imop.policy.hypotheses import distinct
 from imop.policy.matcher import Hypothesis, Scene
 from imop.policy.objects import connected
-from imop.policy.refine import FINEST, Refiner, upright
+from imop.policy.refine import FINEST, upright
 from imop.policy.region import Region
 from imop.policy.symmetry import half_turn
+from imop.policy.things import Things
 from imop.types import BoolArray, FloatArray
 
 Opinion = Callable[[FloatArray], FloatArray]
@@ -76,7 +74,7 @@ class Search:
 
     def __init__(self, config: SearchConfig, before: Scene, region: Region) -> None:
         self.config, self.region = config, region
-        self.template = Template(region, before.observation.views)
+        self.template = Template(region, tuple(before.observation.views.values()))
         self.center = region.cloud.points.mean(axis=0)
         self.T_world_gripper = before.observation.T_world_gripper
         self.coarse = [region.cloud.points[farthest_points(region.cloud.points, 400)]]
@@ -96,21 +94,13 @@ class Search:
         thing: FloatArray = points[labels == np.bincount(part_of).argmax()]
         return thing
 
-    def without_held(self, query: Scene, cloud: PointCloud) -> PointCloud:
-        """The part of a query's cloud that is not in the hand, if the region is not what is held."""
-        if not len(self.region.p_gripper_held):
-            return cloud
-        p_held = se3.apply(query.observation.T_world_gripper, self.region.p_gripper_held)
-        return cloud.select(~within(cloud.points, p_held, SAME))
-
 
 class Inquiry:
     """One search in one observed scene.
 
     Args:
         search: what is searched, and how.
-        query: the observed scene.
-        things: at least 5 points of it, all that the region may be.
+        things: all that the region may be.
         hints: motions (4, 4) that are tried in any case.
         opinion: the matcher's support, 0 .. 1, of motions (H, 4, 4), beside what the cameras saw.
     """
@@ -118,16 +108,15 @@ class Inquiry:
     def __init__(
         self,
         search: Search,
-        query: Scene,
-        things: PointCloud,
+        things: Things,
         hints: Sequence[FloatArray] = (),
         opinion: Opinion | None = None,
     ) -> None:
         self._search, self._config, self._center = search, search.config, search.center
-        self._judge = Judge(search.template, Surface(things, query.observation.views))
-        self._refine = Refiner(things.points)
-        self.query, self.things, self.hints = query, things, hints
-        self._T_repeated = query.observation.T_world_gripper @ se3.invert(search.T_world_gripper)
+        self._judge = Judge(search.template, things.surface)
+        self.things, self.hints = things, hints
+        T_world_gripper = things.query.observation.T_world_gripper
+        self._T_repeated = T_world_gripper @ se3.invert(search.T_world_gripper)
         self._likely = np.stack([*hints, np.eye(4), self._T_repeated])
         self._begun, self._opinion = bool(hints), opinion
 
@@ -195,13 +184,13 @@ class Inquiry:
         ]
 
     def _moved(self, T: FloatArray, part: int = -1) -> FloatArray:
-        return self._refine(self._search.coarse[part], T)
+        return self.things.refine(self._search.coarse[part], T)
 
     def _refined(self, T: FloatArray) -> Hypothesis:
         return self._judge.judge(self._moved(T))
 
     def _finished(self, T: FloatArray) -> Hypothesis:
-        return self._judge.judge(self._refine(self._search.fine, T, FINEST))
+        return self._judge.judge(self.things.refine(self._search.fine, T, FINEST))
 
     def _upright(self, T: FloatArray) -> Hypothesis:
         return self._judge.judge(upright(T, self._center))
@@ -216,11 +205,6 @@ class Inquiry:
         T_repeated = self._T_repeated.copy()
         T_repeated[:3, 3] += (se3.apply(T, p) - se3.apply(T_repeated, p))[0]
         return T_repeated
-
-    @cached_property
-    def labels(self) -> NDArray[np.int64]:
-        """(N,) number of the connected thing that each point of `things` belongs to."""
-        return connected(self.things.points)
 
     def _near(self, motions: FloatArray, T: FloatArray) -> BoolArray:
         """(H,) which motions carry the region about where `T` does."""
@@ -244,8 +228,8 @@ class Inquiry:
         """
         if self._opinion is None:
             return np.zeros(len(motions))
-        turned = np.stack([self._half_turn(T) for T in motions])
-        support = np.maximum(self._opinion(motions), self._opinion(turned))
+        both = np.stack([motions, motions @ self._search.half_turn])
+        support = self._opinion(both.reshape(-1, 4, 4)).reshape(2, -1).max(axis=0)
         return np.asarray(support / max(support.max(), 1e-9))
 
     def _preference(self, hypothesis: Hypothesis) -> float:

@@ -11,12 +11,10 @@ from typing import Any
 import numpy as np
 
 from imop.errors import MissingExtra
-from imop.geometry import se3
 from imop.geometry.cloud import PointCloud
-from imop.geometry.neighbours import within
-from imop.policy.contacts import SAME
 from imop.policy.matcher import Hypothesis, Scene, Transition
 from imop.policy.region import Region, find_regions
+from imop.policy.things import without_held
 from imop.types import FloatArray
 
 # Neighbours within `radius` that a descriptor looks at, at most.
@@ -112,10 +110,7 @@ class TextbookStep:
         """Where the region is in the query: one answer; hints are not used. See `PreparedStep.match`."""
         if len(query.cloud) < 5:
             return ()
-        things = query.cloud.select(~query.ground.bare)
-        if len(self._region.p_gripper_held):
-            p_held = se3.apply(query.observation.T_world_gripper, self._region.p_gripper_held)
-            things = things.select(~within(things.points, p_held, SAME))
+        things = without_held(query.cloud.select(~query.ground.bare), query, self._region)
         if len(things) < 5:
             return ()
         _open3d().utility.random.seed(self._matcher.seed)

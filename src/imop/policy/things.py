@@ -1,0 +1,45 @@
+"""What of an observed scene a region may be, prepared once for every search in it."""
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imop.geometry import se3
+from imop.geometry.cloud import PointCloud
+from imop.geometry.neighbours import within
+from imop.policy.contacts import SAME
+from imop.policy.evidence import Surface
+from imop.policy.matcher import Scene
+from imop.policy.objects import connected
+from imop.policy.refine import Refiner
+from imop.policy.region import Region
+
+
+class Things:
+    """Points of an observed scene, to be searched.
+
+    Attributes:
+        query: the observed scene.
+        cloud: at least 5 points of it, all that the region may be.
+        surface: the same as evidence.
+        refine: lays regions onto them.
+    """
+
+    def __init__(self, query: Scene, cloud: PointCloud) -> None:
+        self.query, self.cloud = query, cloud
+        self.surface = Surface(cloud, tuple(query.observation.views.values()))
+        self.refine = Refiner(cloud.points)
+
+    @cached_property
+    def labels(self) -> NDArray[np.int64]:
+        """(N,) number of the connected thing that each point belongs to."""
+        return connected(self.cloud.points)
+
+
+def without_held(cloud: PointCloud, query: Scene, region: Region) -> PointCloud:
+    """The part of a query's cloud that is not in the hand, if the region is not what is held."""
+    if not len(region.p_gripper_held):
+        return cloud
+    p_held = se3.apply(query.observation.T_world_gripper, region.p_gripper_held)
+    return cloud.select(~within(cloud.points, p_held, SAME))
