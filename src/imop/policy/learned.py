@@ -26,7 +26,7 @@ from imop.policy.hypotheses import agreement, sample_motions
 from imop.policy.matcher import Hypothesis, Scene, Transition
 from imop.policy.objects import connected, find_objects
 from imop.policy.refine import SMALLEST
-from imop.policy.region import Region
+from imop.policy.region import ENOUGH, Region
 from imop.policy.search import Inquiry, Search, SearchConfig, middle, upright_motions
 from imop.policy.symmetry import equal_turns
 from imop.policy.things import Things, without_held
@@ -42,10 +42,13 @@ LOOSE = 0.03
 AROUND = 0.1
 # A region that no motion explains better than this may have bent. What of it is within `NEXT_TO` metres of
 # where the gripper goes has not, and is found instead if its matches support the whole less than this share
-# of what they support the part.
+# of what they support the part, and the part is explained there better by this score.
 BENT = 0.65
 NEXT_TO = 0.05
-CONTRADICTED = 0.9
+CERTAIN, CONTRADICTED = 0.8, 0.9
+BETTER = 0.1
+# How many of the best motions compete with those to all other things.
+KEPT = 6
 
 
 @dataclass(frozen=True)
@@ -152,6 +155,10 @@ class LearnedStep:
             return confirmed
         seeds = np.concatenate([fit, self._sampled(matches), self._upright(matches, things)])
         whole = inquiry.search(seeds)
+        if whole[0].score > BENT:
+            return whole
+        found = np.stack([h.T_query_support for h in whole[:KEPT]])
+        whole = inquiry.search(np.concatenate([found, self._anywhere(things)]))
         return whole if whole[0].score > BENT else self._unbent(matches, inquiry, whole)
 
     def _unbent(
@@ -176,8 +183,12 @@ class LearnedStep:
         motions = np.stack([part[0].T_query_support, whole[0].T_query_support])
         if closer.alike(*motions):
             return whole
+        if self._in_hand:
+            return part
         for_part, for_whole = opinion(motions)
-        return part if self._in_hand or for_whole < CONTRADICTED * for_part else whole
+        explained = max(whole[0].score, closer.finished(motions[1]).score + BETTER)
+        contradicted = for_part > CERTAIN and for_whole < CONTRADICTED * for_part
+        return part if contradicted and part[0].score > explained else whole
 
     def _matches(self, found: Correspondence, seen: Graph) -> "_Matches":
         """The likeliest query points of every region point."""
@@ -225,6 +236,15 @@ class LearnedStep:
                 place = middle(points[labels == label])[None]
                 seeds += [upright_motions(center, place, self._matcher.turns) for center in self._middles]
         return np.concatenate([np.zeros((0, 4, 4)), *seeds])
+
+
+    def _anywhere(self, things: Things) -> FloatArray:
+        """(H, 4, 4) motions, in every turn, to every thing there is: the matches may be of a wrong one."""
+        points, labels = things.cloud.points, things.labels
+        large = np.flatnonzero(np.bincount(labels) >= ENOUGH)
+        places = np.array([middle(points[labels == label]) for label in large]).reshape(-1, 3)
+        turns = self._matcher.turns
+        return np.concatenate([upright_motions(center, places, turns) for center in self._middles])
 
 
 @dataclass(frozen=True, eq=False)

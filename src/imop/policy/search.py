@@ -141,7 +141,7 @@ class Inquiry:
         if self._config.turned:
             turned = self._refined(self._half_turn(T))
             found += [turned, self._upright(turned.T_query_support)]
-        found.append(self._finished(self._ordered(found)[0].T_query_support))
+        found.append(self.finished(self._ordered(found)[0].T_query_support))
         ordered = self._ordered(found)
         return ordered if ordered[0].score >= self._config.sure else ()
 
@@ -159,7 +159,7 @@ class Inquiry:
         ends = [self._half_turn(h.T_query_support) for h in _best(found, self._config.turned)]
         found = _best(found + self._judged([self._moved(T, part) for part in parts for T in ends]))
         # The last half millimetre is worth looking for only where it matters.
-        found = _best(found + [self._finished(h.T_query_support) for h in found[: self._config.finished]])
+        found = _best(found + [self.finished(h.T_query_support) for h in found[: self._config.finished]])
         return self._ordered(
             found + [self._upright(h.T_query_support) for h in found[: self._config.righted]]
         )
@@ -189,7 +189,8 @@ class Inquiry:
     def _refined(self, T: FloatArray) -> Hypothesis:
         return self._judge.judge(self._moved(T))
 
-    def _finished(self, T: FloatArray) -> Hypothesis:
+    def finished(self, T: FloatArray) -> Hypothesis:
+        """The nearest motion to `T` (4, 4) that lays the region onto what was observed, judged."""
         return self._judge.judge(self.things.refine(self._search.fine, T, FINEST))
 
     def _upright(self, T: FloatArray) -> Hypothesis:
