@@ -18,18 +18,18 @@ from imop.geometry import se3
 from imop.geometry.cloud import farthest_points
 from imop.geometry.neighbours import nearest, within
 from imop.networks.graph import Graph, build_graph
-from imop.networks.matching import Correspondence, reposition
+from imop.networks.matching import reposition
 from imop.networks.model import Model
 from imop.networks.region import StepBatch, one_step
 from imop.policy.contacts import GRASP, SAME, find_contacts, is_open
-from imop.policy.hypotheses import agreement, sample_motions
 from imop.policy.matcher import Hypothesis, Scene, Transition
+from imop.policy.matches import Matches, likeliest
 from imop.policy.objects import connected, find_objects
 from imop.policy.refine import SMALLEST
 from imop.policy.region import ENOUGH, Region
-from imop.policy.search import Inquiry, Search, SearchConfig, middle, upright_motions
+from imop.policy.search import Inquiry, Search, SearchConfig, upright_motions
 from imop.policy.symmetry import equal_turns
-from imop.policy.things import Things, without_held
+from imop.policy.things import Things, middle, without_held
 from imop.types import FloatArray
 
 # A region of fewer points cannot be matched.
@@ -145,7 +145,9 @@ class LearnedStep:
         standing = without_held(query.cloud.select(~query.ground.bare), query, self._region)
         if len(standing) < 5:
             return ()
-        matches = self._matches(found, seen)
+        matches = likeliest(
+            found.last[0], self._graph, self._chosen, seen, self._probability, self._matcher.candidates
+        )
         fit = reposition(found.last, found.p_region, found.p_query).double().numpy()
         things = Things(query, standing)
         inquiry = Inquiry(self._search, things, hints, partial(self._opinion, matches))
@@ -153,16 +155,15 @@ class LearnedStep:
         confirmed = inquiry.confirm(np.stack(trusted)) if trusted else ()
         if confirmed:
             return confirmed
-        seeds = np.concatenate([fit, self._sampled(matches), self._upright(matches, things)])
-        whole = inquiry.search(seeds)
+        whole = inquiry.search(np.concatenate([fit, self._seeds(matches, things)]))
         if whole[0].score > BENT:
             return whole
-        found = np.stack([h.T_query_support for h in whole[:KEPT]])
-        whole = inquiry.search(np.concatenate([found, self._anywhere(things)]))
+        best = np.stack([hypothesis.T_query_support for hypothesis in whole[:KEPT]])
+        whole = inquiry.search(np.concatenate([best, self._anywhere(things)]))
         return whole if whole[0].score > BENT else self._unbent(matches, inquiry, whole)
 
     def _unbent(
-        self, matches: "_Matches", inquiry: Inquiry, whole: tuple[Hypothesis, ...]
+        self, matches: Matches, inquiry: Inquiry, whole: tuple[Hypothesis, ...]
     ) -> tuple[Hypothesis, ...]:
         """Where the part of the region next to the gripper is, if that contradicts where the whole is.
 
@@ -176,7 +177,7 @@ class LearnedStep:
         if self._in_hand:
             part = closer.repeated()
         else:
-            seeds = np.concatenate([self._sampled(near), self._upright(near, inquiry.things)])
+            seeds = self._seeds(near, inquiry.things)
             if not len(seeds):
                 return whole
             part = closer.search(seeds)
@@ -190,22 +191,14 @@ class LearnedStep:
         contradicted = for_part > CERTAIN and for_whole < CONTRADICTED * for_part
         return part if contradicted and part[0].score > explained else whole
 
-    def _matches(self, found: Correspondence, seen: Graph) -> "_Matches":
-        """The likeliest query points of every region point."""
-        weight, best = found.last[0].topk(min(self._matcher.candidates, len(seen.points)), dim=1)
-        i = torch.arange(len(weight)).repeat_interleave(weight.shape[1])
-        x, n_x = (t[self._chosen][i].double().numpy() for t in _surface(self._graph))
-        y, n_y = (t[best.flatten()].double().numpy() for t in _surface(seen))
-        return _Matches(x, n_x, y, n_y, weight.flatten().double().numpy() * self._probability[i] + 1e-6)
-
-    def _trusted(self, m: "_Matches", fit: FloatArray, hints: Sequence[FloatArray]) -> list[FloatArray]:
+    def _trusted(self, m: Matches, fit: FloatArray, hints: Sequence[FloatArray]) -> list[FloatArray]:
         """Motions worth a look before a search; none if many turns are equal, for then a few compete."""
         if len(self._turns) > 1:
             return []
         agreed = m.agreement(fit)[0] > self._matcher.trusted
         return [*hints, *fit] if agreed else list(hints)
 
-    def _opinion(self, m: "_Matches", T: FloatArray) -> FloatArray:
+    def _opinion(self, m: Matches, T: FloatArray) -> FloatArray:
         """(H,) share of the matches that speak for motions (H, 4, 4), in any of the turns of equal shape.
 
         Of a round jar the networks match any side to any; its label is for the judge.
@@ -214,61 +207,17 @@ class LearnedStep:
         support: FloatArray = m.agreement(turned, LOOSE).reshape(len(T), -1).max(axis=1)
         return support
 
-    def _sampled(self, m: "_Matches") -> FloatArray:
-        """(H, 4, 4) motions that some matches agree on."""
-        samples, seed = self._matcher.samples, self._matcher.seed
-        return sample_motions(m.x, m.y, m.n_x, m.n_y, m.weight, samples=samples, seed=seed)
-
-    def _upright(self, m: "_Matches", things: Things) -> FloatArray:
-        """(H, 4, 4) motions, in every turn, to the things that most of the region was matched to.
-
-        Where something is, the matches say long before they say how it is turned.
-        """
-        points, labels = things.cloud.points, things.labels
-        thing = labels[nearest(m.y, points)[1][:, 0]]
-        weights = np.bincount(thing, weights=m.weight, minlength=labels.max() + 1)
-        seeds = []
-        for label in np.argsort(-weights)[: self._matcher.places]:
-            w = m.weight * (thing == label)
-            if w.sum() > 0.1 * m.weight.sum():
-                x, y = (np.average(points, axis=0, weights=w) for points in (m.x, m.y))
-                seeds.append(upright_motions(x, y[None], self._matcher.turns))
-                place = middle(points[labels == label])[None]
-                seeds += [upright_motions(center, place, self._matcher.turns) for center in self._middles]
-        return np.concatenate([np.zeros((0, 4, 4)), *seeds])
-
+    def _seeds(self, m: Matches, things: Things) -> FloatArray:
+        """(H, 4, 4) motions that matches speak for."""
+        matcher = self._matcher
+        agreed = m.motions(matcher.samples, matcher.seed)
+        upright = m.upright(things, matcher.places, matcher.turns, self._middles)
+        return np.concatenate([agreed, upright])
 
     def _anywhere(self, things: Things) -> FloatArray:
         """(H, 4, 4) motions, in every turn, to every thing there is: the matches may be of a wrong one."""
-        points, labels = things.cloud.points, things.labels
-        large = np.flatnonzero(np.bincount(labels) >= ENOUGH)
-        places = np.array([middle(points[labels == label]) for label in large]).reshape(-1, 3)
-        turns = self._matcher.turns
+        places, turns = things.places(ENOUGH), self._matcher.turns
         return np.concatenate([upright_motions(center, places, turns) for center in self._middles])
-
-
-@dataclass(frozen=True, eq=False)
-class _Matches:
-    """(K, 3) points and normals of the region and of the query, and how likely they belong together."""
-
-    x: FloatArray
-    n_x: FloatArray
-    y: FloatArray
-    n_y: FloatArray
-    weight: FloatArray
-
-    def of(self, points: FloatArray) -> "_Matches":
-        """Those of what is around points (N, 3) of the region."""
-        kept = within(self.x, points, SAME)
-        return _Matches(*(values[kept] for values in (self.x, self.n_x, self.y, self.n_y, self.weight)))
-
-    def agreement(self, T: FloatArray, tolerance: float = 0.015) -> FloatArray:
-        """(H,) share of the matches that each motion (H, 4, 4) carries nearer than `tolerance`, metres."""
-        return agreement(T, self.x, self.y, self.weight, tolerance)
-
-
-def _surface(graph: Graph) -> tuple[Tensor, Tensor]:
-    return graph.levels[0].points, graph.levels[0].normals
 
 
 def _batch(step: Transition, before: Graph, after: Graph, neighbours: int) -> StepBatch:

@@ -9,10 +9,10 @@ from imop.geometry.cloud import PointCloud, farthest_points, voxel_downsample
 from imop.geometry.features import fpfh
 from imop.policy.hypotheses import mutual_matches, sample_motions
 from imop.policy.matcher import Hypothesis, Scene, Transition
-from imop.policy.objects import connected, find_objects
+from imop.policy.objects import find_objects
 from imop.policy.region import Region, find_regions
-from imop.policy.search import Inquiry, Search, SearchConfig, middle, upright_motions
-from imop.policy.things import Things, without_held
+from imop.policy.search import Inquiry, Search, SearchConfig, upright_motions
+from imop.policy.things import Things, middle, without_held
 from imop.types import FloatArray
 
 
@@ -69,11 +69,13 @@ class RegisteredStep:
         """Where the region is in the query, best first; see `PreparedStep.match`."""
         if len(query.cloud) < 5:
             return ()
-        things = without_held(find_objects(query.cloud, query.ground.plane).cloud, query, self._region)
-        if len(things) < 5:
+        standing = without_held(find_objects(query.cloud, query.ground.plane).cloud, query, self._region)
+        if len(standing) < 5:
             return ()
-        seeds = np.concatenate([self._sampled(things), self._upright(things)])
-        return Inquiry(self._search, Things(query, things), hints).search(seeds)
+        things = Things(query, standing)
+        upright = upright_motions(middle(self.region), things.places(), self._matcher.turns)
+        seeds = np.concatenate([self._sampled(standing), upright])
+        return Inquiry(self._search, things, hints).search(seeds)
 
     def _sampled(self, things: PointCloud) -> FloatArray:
         """(H, 4, 4) motions from matched descriptors."""
@@ -83,9 +85,3 @@ class RegisteredStep:
         assert x.normals is not None and y.normals is not None
         seed = self._matcher.seed
         return sample_motions(x.points, y.points, x.normals, y.normals, pairs.weight, seed=seed)
-
-    def _upright(self, things: PointCloud) -> FloatArray:
-        """(H, 4, 4) motions that set the region on the place of every object of the query, in every turn."""
-        labels = connected(things.points)
-        places = [middle(things.points[labels == label]) for label in range(labels.max() + 1)]
-        return upright_motions(middle(self.region), np.stack(places), self._matcher.turns)

@@ -15,7 +15,7 @@ from imop.policy.objects import connected
 from imop.policy.refine import FINEST, upright
 from imop.policy.region import Region
 from imop.policy.symmetry import half_turn
-from imop.policy.things import Things
+from imop.policy.things import Things, middle
 from imop.types import BoolArray, FloatArray
 
 Opinion = Callable[[FloatArray], FloatArray]
@@ -258,9 +258,3 @@ def upright_motions(center: FloatArray, places: FloatArray, turns: int) -> Float
     yaw = np.linspace(0.0, 2 * np.pi, turns, endpoint=False)
     R = np.tile(np.stack([se3.euler(z=float(angle)) for angle in yaw]), (len(places), 1, 1))
     return se3.make(R, np.repeat(places, turns, axis=0) - R @ center)
-
-
-def middle(points: FloatArray) -> FloatArray:
-    """Centre of the bounding box: which side was seen shifts it less than the mean."""
-    center: FloatArray = (points.min(axis=0) + points.max(axis=0)) / 2
-    return center

@@ -14,6 +14,7 @@ from imop.policy.matcher import Scene
 from imop.policy.objects import connected
 from imop.policy.refine import Refiner
 from imop.policy.region import Region
+from imop.types import FloatArray
 
 
 class Things:
@@ -35,6 +36,18 @@ class Things:
     def labels(self) -> NDArray[np.int64]:
         """(N,) number of the connected thing that each point belongs to."""
         return connected(self.cloud.points)
+
+    def places(self, fewest: int = 1) -> FloatArray:
+        """(P, 3) the middle of each connected thing of at least so many points."""
+        points, labels = self.cloud.points, self.labels
+        large = np.flatnonzero(np.bincount(labels) >= fewest)
+        return np.array([middle(points[labels == label]) for label in large]).reshape(-1, 3)
+
+
+def middle(points: FloatArray) -> FloatArray:
+    """Centre of the bounding box: which side was seen shifts it less than the mean."""
+    center: FloatArray = (points.min(axis=0) + points.max(axis=0)) / 2
+    return center
 
 
 def without_held(cloud: PointCloud, query: Scene, region: Region) -> PointCloud:
