@@ -43,7 +43,7 @@ AROUND = 0.1
 # A region that no motion explains better than this may have bent. What of it is within `NEXT_TO` metres of
 # where the gripper goes has not, and is found instead if its matches support the whole less than this share
 # of what they support the part, and the part is explained there better by this score.
-BENT = 0.65
+BENT = 0.7
 NEXT_TO = 0.05
 CERTAIN, CONTRADICTED = 0.8, 0.9
 BETTER = 0.1
