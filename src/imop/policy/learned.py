@@ -68,7 +68,7 @@ class LearnedMatcher:
     """
 
     model: Model
-    threshold: float = 0.5
+    threshold: float = 0.3
     candidates: int = 2
     trusted: float = 0.5
     samples: int = 4000

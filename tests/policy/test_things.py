@@ -1,0 +1,38 @@
+"""What a region may be: connected things, without what is in the hand."""
+
+import numpy as np
+
+from imop.geometry import se3
+from imop.geometry.cloud import concatenate
+from imop.policy.region import Region
+from imop.policy.things import Things, middle, without_held
+from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, scene
+
+HOME = above(0.2, 0.1, 1.0)
+CUBE = (0.04, 0.04, 0.04)
+
+
+def test_every_thing_has_its_place_and_small_ones_can_be_left_out():
+    cubes = [box(CUBE, RED, at(x, 0.1), seed=k) for k, x in enumerate((0.0, 0.2))]
+    crumb = box((0.01, 0.01, 0.01), BLUE, at(0.4, 0.1))
+    things = Things(scene([], HOME), concatenate([*cubes, crumb]))
+    assert len(things.places()) == 3
+    places = things.places(len(crumb) + 1)
+    np.testing.assert_allclose(places[places[:, 0].argsort(), 0], (0.0, 0.2), atol=0.003)
+    assert len(things.places(10**6)) == 0
+
+
+def test_the_middle_does_not_depend_on_how_much_of_a_side_was_seen():
+    cube = box(CUBE, RED, at(0.1, 0.1))
+    half = cube.select((cube.points[:, 0] < 0.1) | (np.arange(len(cube)) % 5 == 0))
+    np.testing.assert_allclose(middle(half.points), middle(cube.points), atol=0.002)
+
+
+def test_what_is_in_the_hand_is_left_out_unless_it_is_the_region():
+    held, other = box(CUBE, RED, at(0.2, 0.1, 0.98)), box(CUBE, BLUE, at(0.0, -0.1))
+    query = scene([held, other], HOME)
+    p_held = se3.apply(se3.invert(HOME), held.points)
+    region = Region(other, np.ones(len(other)), p_held)
+    left = without_held(query.cloud, query, region)
+    assert left.points[:, 2].max() < TABLE + 0.05 and len(left) == len(query.cloud) - len(held)
+    assert without_held(query.cloud, query, Region(held, np.ones(len(held)), p_held[:0])) is query.cloud
