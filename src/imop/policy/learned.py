@@ -173,6 +173,10 @@ class LearnedStep:
         if len(near.x) < 3 or len(self._part.cloud) < SMALLEST:
             return whole
         opinion = partial(self._opinion, near)
+        T_whole = whole[0].T_query_support
+        for_whole = opinion(T_whole[None])[0]
+        if for_whole >= CONTRADICTED and not self._in_hand:
+            return whole
         closer = Inquiry(self._search_part, inquiry.things, inquiry.hints, opinion)
         if self._in_hand:
             part = closer.repeated()
@@ -181,13 +185,13 @@ class LearnedStep:
             if not len(seeds):
                 return whole
             part = closer.search(seeds)
-        motions = np.stack([part[0].T_query_support, whole[0].T_query_support])
-        if closer.alike(*motions):
+        T_part = part[0].T_query_support
+        if closer.alike(T_part, T_whole):
             return whole
         if self._in_hand:
             return part
-        for_part, for_whole = opinion(motions)
-        explained = max(whole[0].score, closer.finished(motions[1]).score + BETTER)
+        for_part = opinion(T_part[None])[0]
+        explained = max(whole[0].score, closer.finished(T_whole).score + BETTER)
         contradicted = for_part > CERTAIN and for_whole < CONTRADICTED * for_part
         return part if contradicted and part[0].score > explained else whole
 
