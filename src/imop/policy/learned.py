@@ -36,17 +36,18 @@ from imop.types import FloatArray
 FEWEST = 8
 # Share of what is held in the region of a step that lets go from which nothing else is in it.
 LETS_GO = 0.8
-# Matches nearer than this to where a motion carries them speak for it, metres.
-LOOSE = 0.03
+# Matches nearer than this to where a motion carries them speak for it, metres; `TIGHT` for a part.
+LOOSE, TIGHT = 0.03, 0.015
 # What is connected to the region, this near to it (metres), is its context.
 AROUND = 0.1
 # A region that no motion explains better than this may have bent. What of it is within `NEXT_TO` metres of
-# where the gripper goes has not, and is found instead if its matches support the whole less than this share
-# of what they support the part, and the part is explained there better by this score.
+# where the gripper goes has not. It is found instead if this share of its matches speaks for that, if they
+# support the whole less than this share of what they support the part, if it is explained there better than
+# where the whole is by this score, and about as well as the whole.
 BENT = 0.7
 NEXT_TO = 0.05
 CERTAIN, CONTRADICTED = 0.8, 0.9
-BETTER = 0.1
+BETTER, AS_GOOD = 0.1, 0.85
 # How many of the best motions compete with those to all other things.
 KEPT = 6
 
@@ -68,7 +69,7 @@ class LearnedMatcher:
     """
 
     model: Model
-    threshold: float = 0.3
+    threshold: float = 0.5
     candidates: int = 2
     trusted: float = 0.5
     samples: int = 4000
@@ -174,7 +175,7 @@ class LearnedStep:
             return whole
         opinion = partial(self._opinion, near)
         T_whole = whole[0].T_query_support
-        for_whole = opinion(T_whole[None])[0]
+        for_whole = self._opinion(near, T_whole[None], TIGHT)[0]
         if for_whole >= CONTRADICTED and not self._in_hand:
             return whole
         closer = Inquiry(self._search_part, inquiry.things, inquiry.hints, opinion)
@@ -190,10 +191,10 @@ class LearnedStep:
             return whole
         if self._in_hand:
             return part
-        for_part = opinion(T_part[None])[0]
-        explained = max(whole[0].score, closer.finished(T_whole).score + BETTER)
-        contradicted = for_part > CERTAIN and for_whole < CONTRADICTED * for_part
-        return part if contradicted and part[0].score > explained else whole
+        certain = opinion(T_part[None])[0] > CERTAIN
+        contradicted = for_whole < CONTRADICTED * self._opinion(near, T_part[None], TIGHT)[0]
+        explained = max(AS_GOOD * whole[0].score, closer.finished(T_whole).score + BETTER)
+        return part if certain and contradicted and part[0].score > explained else whole
 
     def _trusted(self, m: Matches, fit: FloatArray, hints: Sequence[FloatArray]) -> list[FloatArray]:
         """Motions worth a look before a search; none if many turns are equal, for then a few compete."""
@@ -202,13 +203,13 @@ class LearnedStep:
         agreed = m.agreement(fit)[0] > self._matcher.trusted
         return [*hints, *fit] if agreed else list(hints)
 
-    def _opinion(self, m: Matches, T: FloatArray) -> FloatArray:
+    def _opinion(self, m: Matches, T: FloatArray, tolerance: float = LOOSE) -> FloatArray:
         """(H,) share of the matches that speak for motions (H, 4, 4), in any of the turns of equal shape.
 
         Of a round jar the networks match any side to any; its label is for the judge.
         """
         turned = (T[:, None] @ self._turns).reshape(-1, 4, 4)
-        support: FloatArray = m.agreement(turned, LOOSE).reshape(len(T), -1).max(axis=1)
+        support: FloatArray = m.agreement(turned, tolerance).reshape(len(T), -1).max(axis=1)
         return support
 
     def _seeds(self, m: Matches, things: Things) -> FloatArray:

@@ -45,7 +45,7 @@ class SearchConfig:
         righted: how many of the best are set upright, too.
         turned: how many of the best are tried half a turn off, too: long things have two ends.
         turn: share of its score that a hypothesis loses for half a turn off the demonstrated motion.
-        tilt: share that it loses for tilting things by `TILTED` or more.
+        tilt: share that it loses for tilting things by `TILTED` or more; twice for turning them over.
         change: share that it loses for another pose than the demonstrated motion leads to, once begun.
         sure: score from which a trusted motion needs no search.
         opinion: what full support by the matcher's opinion adds to the score when motions are compared.
@@ -242,7 +242,7 @@ class Inquiry:
         """
         T, cost = hypothesis.T_query_support, self._config
         turn = float(se3.rotation_distance(T, self._T_repeated)) / np.pi
-        tilt = min(float(np.arccos(np.clip(T[2, 2], -1.0, 1.0))) / TILTED, 1.0)
+        tilt = min(float(np.arccos(np.clip(T[2, 2], -1.0, 1.0))) / TILTED, 1.0) + float(T[2, 2] < 0)
         p_moved, p_repeated = se3.apply(np.stack([T, self._T_repeated]), self._center[None])[:, 0]
         away = max(float(np.linalg.norm(p_moved - p_repeated)) / ELSEWHERE, turn * np.pi / OTHERWISE)
         away = min(away, 1.0) if self._begun else 0.0
