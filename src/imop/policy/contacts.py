@@ -38,6 +38,22 @@ class Contacts:
         later = np.flatnonzero(self.event[step:])
         return step + int(later[0]) if len(later) else None
 
+    def taken(self, step: int, steps: Sequence[Transition]) -> FloatArray:
+        """(H, 3) points, world frame, that `step` goes to take: the hand moves them after the next grasp.
+
+        None are returned for steps that something is in the hand of, or that leave what they let go before.
+        """
+        begins = np.flatnonzero(self.holding[step:])
+        if not len(begins) or begins[0] == 0:
+            return np.zeros((0, 3))
+        first = step + int(begins[0])
+        if self.event[:step].any() and step < first - 1 and leaving(steps[step], steps[first - 1]):
+            return np.zeros((0, 3))
+        free = np.flatnonzero(~self.holding[first:])
+        last = first + int(free[0]) if len(free) else len(self.holding)
+        # What was seen of it only grows while it is held.
+        return se3.apply(steps[first].before.observation.T_world_gripper, self.p_gripper_held[last - 1])
+
 
 def find_contacts(steps: Sequence[Transition], objects: Sequence[Objects]) -> Contacts:
     """Go through the demonstration; `objects` are those of each step's support state."""
@@ -63,6 +79,13 @@ def find_contacts(steps: Sequence[Transition], objects: Sequence[Objects]) -> Co
         if opens:
             in_hand, known = False, np.zeros((0, 3))
     return Contacts(event, holding, tuple(held))
+
+
+def leaving(step: Transition, event: Transition) -> bool:
+    """Whether a step goes to a place nearer to where it begins than to where a later event takes place."""
+    T_goal, T_now = step.action.T_world_gripper, step.before.observation.T_world_gripper
+    away = se3.translation_distance(T_goal, event.action.T_world_gripper)
+    return bool(se3.translation_distance(T_goal, T_now) < away)
 
 
 def is_open(step: Transition) -> bool:

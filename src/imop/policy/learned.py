@@ -14,17 +14,16 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from imop.geometry import se3
 from imop.geometry.cloud import farthest_points
-from imop.geometry.neighbours import nearest, within
+from imop.geometry.neighbours import within
 from imop.networks.graph import Graph, build_graph
 from imop.networks.matching import reposition
 from imop.networks.model import Model
-from imop.networks.region import StepBatch, one_step
-from imop.policy.contacts import GRASP, SAME, find_contacts, is_open
+from imop.policy.contacts import GRASP, SAME
+from imop.policy.evidence import Surface
+from imop.policy.learned_region import FEWEST, ShownRegion, find_shown_regions
 from imop.policy.matcher import Hypothesis, Scene, Transition
 from imop.policy.matches import Matches, likeliest
-from imop.policy.objects import connected, find_objects
 from imop.policy.refine import SMALLEST
 from imop.policy.region import ENOUGH, Region
 from imop.policy.search import Inquiry, Search, SearchConfig, upright_motions
@@ -32,14 +31,8 @@ from imop.policy.symmetry import equal_turns
 from imop.policy.things import Things, middle, without_held
 from imop.types import FloatArray
 
-# A region of fewer points cannot be matched.
-FEWEST = 8
-# Share of what is held in the region of a step that lets go from which nothing else is in it.
-LETS_GO = 0.8
 # Matches nearer than this to where a motion carries them speak for it, metres; `TIGHT` for a part.
 LOOSE, TIGHT = 0.03, 0.015
-# What is connected to the region, this near to it (metres), is its context.
-AROUND = 0.1
 # A region that no motion explains better than this may have bent. What of it is within `NEXT_TO` metres of
 # where the gripper goes has not. It is found instead if this share of its matches speaks for that, if they
 # support the whole less than this share of what they support the part, if it is explained there better than
@@ -82,86 +75,143 @@ class LearnedMatcher:
 
     def prepare(self, steps: Sequence[Transition]) -> list["LearnedStep"]:
         """Find the regions of a demonstration's steps and describe them."""
-        objects = [find_objects(step.before.cloud, step.before.ground.plane) for step in steps]
-        contacts = find_contacts(steps, objects)
-        return [
-            LearnedStep(self, step, p_held, bool(holding))
-            for step, p_held, holding in zip(steps, contacts.p_gripper_held, contacts.holding, strict=True)
-        ]
+        shown = find_shown_regions(self.model, steps, self.threshold)
+        return [LearnedStep(self, step, region) for step, region in zip(steps, shown, strict=True)]
+
+
+class Sought:
+    """One region of a demonstrated step, as the matching network and the search look for it."""
+
+    def __init__(
+        self, matcher: LearnedMatcher, before: Scene, shown: ShownRegion, described: Tensor, region: Region
+    ) -> None:
+        self._matcher, self._graph, self._described = matcher, shown.graph, described
+        self.region = region
+        inside = shown.inside if region is shown.region else _nodes(shown.graph, region)
+        few = farthest_points(shown.graph.points[inside].double().numpy(), self._most)
+        self._chosen = inside[torch.from_numpy(few).sort().values]
+        self._probability = shown.probability[self._chosen].double().numpy()
+        self.search = Search(matcher.search, before, region)
+        self._middles = [middle(region.cloud.points)]
+        if region.context is not None:
+            self._middles.append(middle(region.whole.points))
+        self._turns = equal_turns(self.search.template.surface.colorless(), self._middles[0])
+
+    @property
+    def _most(self) -> int:
+        return self._matcher.model.config.matching.max_region
+
+    def matched(self, seen: Graph) -> tuple[Matches, FloatArray]:
+        """The network's matches in a query, and the motions (H, 4, 4) that most of them agree on."""
+        with torch.inference_mode():
+            found = self._matcher.model.matching(self._graph, self._chosen, seen, self._described)
+        C, candidates = found.last[0], self._matcher.candidates
+        matches = likeliest(C, self._graph, self._chosen, seen, self._probability, candidates)
+        return matches, reposition(found.last, found.p_region, found.p_query).double().numpy()
+
+    def trusted(self, m: Matches, fit: FloatArray, hints: Sequence[FloatArray]) -> list[FloatArray]:
+        """Motions worth a look before a search; none if many turns are equal, for then a few compete."""
+        if len(self._turns) > 1:
+            return []
+        agreed = m.agreement(fit)[0] > self._matcher.trusted
+        return [*hints, *fit] if agreed else list(hints)
+
+    def opinion(self, m: Matches, T: FloatArray, tolerance: float = LOOSE) -> FloatArray:
+        """(H,) share of the matches that speak for motions (H, 4, 4), in any of the turns of equal shape.
+
+        Of a round jar the networks match any side to any; its label is for the judge.
+        """
+        turned = (T[:, None] @ self._turns).reshape(-1, 4, 4)
+        support: FloatArray = m.agreement(turned, tolerance).reshape(len(T), -1).max(axis=1)
+        return support
+
+    def seeds(self, m: Matches, things: Things) -> FloatArray:
+        """(H, 4, 4) motions that matches speak for."""
+        matcher = self._matcher
+        agreed = m.motions(matcher.samples, matcher.seed)
+        upright = m.upright(things, matcher.places, matcher.turns, self._middles)
+        return np.concatenate([agreed, upright])
+
+    def anywhere(self, things: Things) -> FloatArray:
+        """(H, 4, 4) motions, in every turn, to every thing there is: the matches may be of a wrong one."""
+        places, turns = things.places(ENOUGH), self._matcher.turns
+        return np.concatenate([upright_motions(center, places, turns) for center in self._middles])
 
 
 class LearnedStep:
     """A demonstrated step prepared for the matching network."""
 
-    def __init__(
-        self, matcher: LearnedMatcher, step: Transition, p_gripper_held: FloatArray, holding: bool
-    ) -> None:
-        self._matcher = matcher
-        model = matcher.model
-        config = model.config.graph
-        before, after = (build_graph(s.cloud, config, s.ground) for s in (step.before, step.after))
+    def __init__(self, matcher: LearnedMatcher, step: Transition, shown: ShownRegion) -> None:
+        self._config, self._model, self._before = matcher.search, matcher.model, step.before
         with torch.inference_mode():
-            logits = model.region(_batch(step, before, after, config.neighbours))[-1]
-            self._described = model.matching.backbone(before)
-        probability = torch.sigmoid(logits)
-        inside = self._inside(probability)
-        self._region = _dense(step, before, probability, inside, p_gripper_held)
-        few = farthest_points(before.points[inside].double().numpy(), model.config.matching.max_region)
-        self._graph, self._chosen = before, inside[torch.from_numpy(few).sort().values]
-        self._probability = probability[self._chosen].double().numpy()
-        self._middles = [middle(self.region)]
-        if self._region.context is not None:
-            self._middles.append(middle(self._region.whole.points))
-        self._search = Search(matcher.search, step.before, self._region)
-        self._turns = equal_turns(self._search.template.surface.colorless(), self._middles[0])
-        self._part = self._region.next_to(step.action.T_world_gripper[:3, 3], NEXT_TO)
-        self._before = step.before
+            described = self._model.matching.backbone(shown.graph)
+        region = shown.region
+        self._sought = Sought(matcher, step.before, shown, described, region)
+        self._taken = None
+        if shown.taken is not None and len(_nodes(shown.graph, shown.taken)) >= FEWEST:
+            self._taken = Sought(matcher, step.before, shown, described, shown.taken)
+            rest = region.whole.select(~within(region.whole.points, shown.taken.cloud.points, SAME))
+            self._rest = Surface(rest, ())
+        self._part = region.next_to(step.action.T_world_gripper[:3, 3], NEXT_TO)
         tip = step.before.observation.T_world_gripper[None, :3, 3]
-        self._in_hand = holding and bool(within(tip, self._part.cloud.points, GRASP)[0])
+        self._in_hand = shown.holding and bool(within(tip, self._part.cloud.points, GRASP)[0])
 
     @cached_property
     def _search_part(self) -> Search:
         """Few steps need it, and it takes as long to prepare as that of the region."""
-        return Search(self._matcher.search, self._before, self._part)
-
-    def _inside(self, probability: Tensor) -> Tensor:
-        """(R,) points of the region, in order of their index; the likeliest few if there seems to be none."""
-        count = int((probability > self._matcher.threshold).sum())
-        count = min(max(count, FEWEST), len(probability))
-        return probability.topk(count).indices.sort().values
+        return Search(self._config, self._before, self._part)
 
     @property
     def region(self) -> FloatArray:
         """(M, 3) points of the region in the demonstrated scene."""
-        return self._region.cloud.points
+        return self._sought.region.cloud.points
 
     def match(self, query: Scene, hints: Sequence[FloatArray] = ()) -> tuple[Hypothesis, ...]:
         """Where the region is in the query, best first; see `PreparedStep.match`."""
         if len(query.cloud) < 5:
             return ()
-        model = self._matcher.model
-        seen = build_graph(query.cloud, model.config.graph, query.ground)
-        with torch.inference_mode():
-            found = model.matching(self._graph, self._chosen, seen, self._described)
-        standing = without_held(query.cloud.select(~query.ground.bare), query, self._region)
+        standing = without_held(query.cloud.select(~query.ground.bare), query, self._sought.region)
         if len(standing) < 5:
             return ()
-        matches = likeliest(
-            found.last[0], self._graph, self._chosen, seen, self._probability, self._matcher.candidates
-        )
-        fit = reposition(found.last, found.p_region, found.p_query).double().numpy()
+        seen = build_graph(query.cloud, self._model.config.graph, query.ground)
         things = Things(query, standing)
-        inquiry = Inquiry(self._search, things, hints, partial(self._opinion, matches))
-        trusted = self._trusted(matches, fit, hints)
+        matches, fit = self._sought.matched(seen)
+        inquiry = Inquiry(self._sought.search, things, hints, partial(self._sought.opinion, matches))
+        whole = self._whole(matches, fit, inquiry)
+        return whole if self._taken is None else self._loose(self._taken, seen, inquiry, whole)
+
+    def _whole(self, matches: Matches, fit: FloatArray, inquiry: Inquiry) -> tuple[Hypothesis, ...]:
+        """Where the whole region is, or the part of it that is next to the gripper."""
+        sought, things = self._sought, inquiry.things
+        trusted = sought.trusted(matches, fit, inquiry.hints)
         confirmed = inquiry.confirm(np.stack(trusted)) if trusted else ()
         if confirmed:
             return confirmed
-        whole = inquiry.search(np.concatenate([fit, self._seeds(matches, things)]))
+        whole = inquiry.search(np.concatenate([fit, sought.seeds(matches, things)]))
         if whole[0].score > BENT:
             return whole
         best = np.stack([hypothesis.T_query_support for hypothesis in whole[:KEPT]])
-        whole = inquiry.search(np.concatenate([best, self._anywhere(things)]))
+        whole = inquiry.search(np.concatenate([best, sought.anywhere(things)]))
         return whole if whole[0].score > BENT else self._unbent(matches, inquiry, whole)
+
+    def _loose(
+        self, taken: Sought, seen: Graph, inquiry: Inquiry, whole: tuple[Hypothesis, ...]
+    ) -> tuple[Hypothesis, ...]:
+        """Where what the hand takes is, if it is not where it would be in the whole region.
+
+        Notes on a safe may lie anywhere on it. They are looked for in what the rest of the region leaves.
+        """
+        T_whole, things = whole[0].T_query_support, inquiry.things
+        there = Inquiry(taken.search, things).finished(T_whole)
+        left = things.unexplained(self._rest, T_whole)
+        if there.score > BENT or left is None:
+            return whole
+        matches, fit = taken.matched(seen)
+        alone = Inquiry(taken.search, things, inquiry.hints, partial(taken.opinion, matches))
+        found = alone.search(
+            np.concatenate([T_whole[None], fit, taken.seeds(matches, left), taken.anywhere(left)])
+        )
+        return found if found[0].score > there.score + BETTER else whole
 
     def _unbent(
         self, matches: Matches, inquiry: Inquiry, whole: tuple[Hypothesis, ...]
@@ -173,16 +223,16 @@ class LearnedStep:
         near = matches.of(self._part.cloud.points)
         if len(near.x) < 3 or len(self._part.cloud) < SMALLEST:
             return whole
-        opinion = partial(self._opinion, near)
+        opinion = partial(self._sought.opinion, near)
         T_whole = whole[0].T_query_support
-        for_whole = self._opinion(near, T_whole[None], TIGHT)[0]
+        for_whole = self._sought.opinion(near, T_whole[None], TIGHT)[0]
         if for_whole >= CONTRADICTED and not self._in_hand:
             return whole
         closer = Inquiry(self._search_part, inquiry.things, inquiry.hints, opinion)
         if self._in_hand:
             part = closer.repeated()
         else:
-            seeds = self._seeds(near, inquiry.things)
+            seeds = self._sought.seeds(near, inquiry.things)
             if not len(seeds):
                 return whole
             part = closer.search(seeds)
@@ -192,69 +242,12 @@ class LearnedStep:
         if self._in_hand:
             return part
         certain = opinion(T_part[None])[0] > CERTAIN
-        contradicted = for_whole < CONTRADICTED * self._opinion(near, T_part[None], TIGHT)[0]
+        contradicted = for_whole < CONTRADICTED * self._sought.opinion(near, T_part[None], TIGHT)[0]
         explained = max(AS_GOOD * whole[0].score, closer.finished(T_whole).score + BETTER)
         return part if certain and contradicted and part[0].score > explained else whole
 
-    def _trusted(self, m: Matches, fit: FloatArray, hints: Sequence[FloatArray]) -> list[FloatArray]:
-        """Motions worth a look before a search; none if many turns are equal, for then a few compete."""
-        if len(self._turns) > 1:
-            return []
-        agreed = m.agreement(fit)[0] > self._matcher.trusted
-        return [*hints, *fit] if agreed else list(hints)
 
-    def _opinion(self, m: Matches, T: FloatArray, tolerance: float = LOOSE) -> FloatArray:
-        """(H,) share of the matches that speak for motions (H, 4, 4), in any of the turns of equal shape.
-
-        Of a round jar the networks match any side to any; its label is for the judge.
-        """
-        turned = (T[:, None] @ self._turns).reshape(-1, 4, 4)
-        support: FloatArray = m.agreement(turned, tolerance).reshape(len(T), -1).max(axis=1)
-        return support
-
-    def _seeds(self, m: Matches, things: Things) -> FloatArray:
-        """(H, 4, 4) motions that matches speak for."""
-        matcher = self._matcher
-        agreed = m.motions(matcher.samples, matcher.seed)
-        upright = m.upright(things, matcher.places, matcher.turns, self._middles)
-        return np.concatenate([agreed, upright])
-
-    def _anywhere(self, things: Things) -> FloatArray:
-        """(H, 4, 4) motions, in every turn, to every thing there is: the matches may be of a wrong one."""
-        places, turns = things.places(ENOUGH), self._matcher.turns
-        return np.concatenate([upright_motions(center, places, turns) for center in self._middles])
-
-
-def _batch(step: Transition, before: Graph, after: Graph, neighbours: int) -> StepBatch:
-    observation, action = step.before.observation, step.action
-    poses = np.stack([action.T_world_gripper, observation.T_world_gripper])
-    gripper = torch.tensor([is_open(step), action.gripper_open], dtype=torch.float32)
-    return one_step(before, after, torch.from_numpy(poses.astype(np.float32)), gripper, neighbours)
-
-
-def _dense(
-    step: Transition, graph: Graph, probability: Tensor, inside: Tensor, p_gripper_held: FloatArray
-) -> Region:
-    """The region on the full cloud: every point belongs as much as the nearest point of the graph does."""
-    cloud = step.before.cloud
-    weight = torch.zeros_like(probability).index_copy(0, inside, probability[inside]).double().numpy()
-    owner = nearest(cloud.points, graph.points.double().numpy())[1][:, 0]
-    member = weight[owner] > 0
-    # The bare table is found everywhere.
-    standing = ~step.before.ground.bare
-    member = member & standing if (member & standing).sum() >= FEWEST else member
-    p_held = se3.apply(step.before.observation.T_world_gripper, p_gripper_held)
-    in_hand = within(cloud.points, p_held, SAME) if len(p_held) else np.zeros(len(cloud), dtype=bool)
-    # A step that lets go is fixed to what stays, not to what is let go.
-    most = LETS_GO if step.action.gripper_open else 0.5
-    if (member & ~in_hand).sum() >= FEWEST and in_hand[member].mean() < most:
-        member = member & ~in_hand
-    else:
-        in_hand, p_gripper_held = np.zeros(len(cloud), dtype=bool), p_gripper_held[:0]
-    region = cloud.select(member)
-    free = np.flatnonzero(standing & ~in_hand | member)
-    labels, own = connected(cloud.points[free]), member[free]
-    # What only stands by says nothing about the region.
-    around = ~own & np.isin(labels, labels[own]) & within(cloud.points[free], region.points, AROUND)
-    context = cloud.select(free[around]) if around.any() else None
-    return Region(region, weight[owner[member]], p_gripper_held, context, firm=True)
+def _nodes(graph: Graph, region: Region) -> Tensor:
+    """(R,) points of the graph that a region is at."""
+    near = within(graph.points.double().numpy(), region.cloud.points, SAME)
+    return torch.from_numpy(np.flatnonzero(near))

@@ -15,7 +15,7 @@ import numpy as np
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, concatenate
 from imop.geometry.neighbours import nearest, within
-from imop.policy.contacts import SAME, Contacts, find_contacts
+from imop.policy.contacts import SAME, Contacts, find_contacts, leaving
 from imop.policy.matcher import Transition
 from imop.policy.objects import Objects, find_objects
 from imop.types import BoolArray, FloatArray
@@ -69,10 +69,11 @@ def find_regions(steps: Sequence[Transition]) -> list[Region]:
     """The region of every step of one demonstration."""
     objects = [find_objects(step.before.cloud, step.before.ground.plane) for step in steps]
     contacts = find_contacts(steps, objects)
-    return [_region(steps, k, objects[k], contacts) for k in range(len(steps))]
+    return [find_region(steps, k, objects[k], contacts) for k in range(len(steps))]
 
 
-def _region(steps: Sequence[Transition], k: int, objects: Objects, contacts: Contacts) -> Region:
+def find_region(steps: Sequence[Transition], k: int, objects: Objects, contacts: Contacts) -> Region:
+    """The region of step `k`; `objects` are those of its support state."""
     T_world_gripper = steps[k].before.observation.T_world_gripper
     p_held = contacts.p_gripper_held[k]
     T_contact = _ahead(steps, k, objects, contacts)
@@ -103,10 +104,8 @@ def _ahead(steps: Sequence[Transition], k: int, objects: Objects, contacts: Cont
     following, begun = contacts.following(k), bool(contacts.event[:k].any())
     if following is None:
         return None if begun else _nearest_pass(steps[k:], objects)
-    T_event = steps[following].action.T_world_gripper
-    T_goal, T_now = steps[k].action.T_world_gripper, steps[k].before.observation.T_world_gripper
-    leaving = se3.translation_distance(T_goal, T_now) < se3.translation_distance(T_goal, T_event)
-    return None if begun and leaving and k != following else T_event
+    left = begun and k != following and leaving(steps[k], steps[following])
+    return None if left else steps[following].action.T_world_gripper
 
 
 def _nearest_pass(steps: Sequence[Transition], objects: Objects) -> FloatArray:

@@ -12,9 +12,12 @@ from imop.policy.contacts import SAME
 from imop.policy.evidence import Surface
 from imop.policy.matcher import Scene
 from imop.policy.objects import connected
-from imop.policy.refine import Refiner
+from imop.policy.refine import SMALLEST, Refiner
 from imop.policy.region import Region
 from imop.types import FloatArray
+
+# A point belongs to a surface that explains it as well as this.
+EXPLAINED = 0.2
 
 
 class Things:
@@ -42,6 +45,12 @@ class Things:
         points, labels = self.cloud.points, self.labels
         large = np.flatnonzero(np.bincount(labels) >= fewest)
         return np.array([middle(points[labels == label]) for label in large]).reshape(-1, 3)
+
+    def unexplained(self, by: Surface, T_query_support: FloatArray) -> "Things | None":
+        """What a moved surface leaves to be explained; None if that is next to nothing."""
+        cloud = self.cloud
+        left = by.explain(cloud, se3.invert(T_query_support))[0] < EXPLAINED
+        return Things(self.query, cloud.select(left)) if left.sum() >= SMALLEST else None
 
 
 def middle(points: FloatArray) -> FloatArray:

@@ -1,0 +1,147 @@
+"""The invariant region of a demonstrated step as the region network finds it, on the full cloud."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from imop.geometry import se3
+from imop.geometry.neighbours import nearest, within
+from imop.networks.graph import Graph, build_graph
+from imop.networks.model import Model
+from imop.networks.region import StepBatch, one_step
+from imop.policy.contacts import SAME, Contacts, find_contacts, is_open
+from imop.policy.matcher import Transition
+from imop.policy.objects import connected, find_objects
+from imop.policy.refine import SMALLEST
+from imop.policy.region import Region, find_region
+from imop.types import FloatArray
+
+# A region of fewer points cannot be matched.
+FEWEST = 8
+# Share of what is held in the region of a step that lets go from which nothing else is in it.
+LETS_GO = 0.8
+# What is connected to the region, this near to it (metres), is its context.
+AROUND = 0.1
+# What the hand takes is told from the rest of the region if the region has this share of it, and if it is
+# less than this share of the region.
+KNOWN, MUCH_MORE = 0.5, 0.8
+# Points nearer to each other than this are of one voxel or of neighbours, metres.
+NEXT = 0.006
+
+
+@dataclass(frozen=True, eq=False)
+class ShownRegion:
+    """A region and where it comes from.
+
+    Attributes:
+        graph: of the support state.
+        probability: (N,) of its points to be in the region, by the network.
+        inside: (R,) those that are, in order of their index.
+        region: the same on the full cloud.
+        taken: what the hand takes next, if the region is much more than that. It will move on its own.
+        holding: whether something is in the hand.
+    """
+
+    graph: Graph
+    probability: Tensor
+    inside: Tensor
+    region: Region
+    taken: Region | None
+    holding: bool
+
+
+def find_shown_regions(model: Model, steps: Sequence[Transition], threshold: float) -> list[ShownRegion]:
+    """The region of every step of one demonstration.
+
+    Args:
+        model: with the region network.
+        steps: of the demonstration.
+        threshold: least probability of a region point.
+    """
+    objects = [find_objects(step.before.cloud, step.before.ground.plane) for step in steps]
+    contacts = find_contacts(steps, objects)
+    return [
+        _find(model, steps, k, contacts, threshold, find_region(steps, k, objects[k], contacts).cloud.points)
+        for k in range(len(steps))
+    ]
+
+
+def _find(
+    model: Model,
+    steps: Sequence[Transition],
+    k: int,
+    contacts: Contacts,
+    threshold: float,
+    instead: FloatArray,
+) -> ShownRegion:
+    """The region of step `k`, or points (M, 3) `instead` if it is nothing but bare ground."""
+    step, config = steps[k], model.config.graph
+    before, after = (build_graph(s.cloud, config, s.ground) for s in (step.before, step.after))
+    with torch.inference_mode():
+        probability = torch.sigmoid(model.region(_batch(step, before, after, config.neighbours))[-1])
+    inside = _likely(probability, threshold)
+    nodes = before.points.double().numpy()
+    standing = ~step.before.ground.bare[nearest(nodes, step.before.cloud.points)[1][:, 0]]
+    if standing[inside].sum() < FEWEST:
+        # The ground is the same everywhere: what stands next to the place says where that is.
+        beside = np.flatnonzero(within(nodes, instead, SAME) & standing)
+        inside = torch.from_numpy(beside) if len(beside) >= FEWEST else inside
+    region = _dense(step, nodes, probability.double().numpy(), inside, contacts.p_gripper_held[k])
+    taken = _taken(step, region, contacts.taken(k, steps))
+    return ShownRegion(before, probability, inside, region, taken, bool(contacts.holding[k]))
+
+
+def _batch(step: Transition, before: Graph, after: Graph, neighbours: int) -> StepBatch:
+    observation, action = step.before.observation, step.action
+    poses = np.stack([action.T_world_gripper, observation.T_world_gripper])
+    gripper = torch.tensor([is_open(step), action.gripper_open], dtype=torch.float32)
+    return one_step(before, after, torch.from_numpy(poses.astype(np.float32)), gripper, neighbours)
+
+
+def _likely(probability: Tensor, threshold: float) -> Tensor:
+    """(R,) points of the region, in order of their index; the likeliest few if there seems to be none."""
+    count = int((probability > threshold).sum())
+    count = min(max(count, FEWEST), len(probability))
+    return probability.topk(count).indices.sort().values
+
+
+def _dense(
+    step: Transition, nodes: FloatArray, probability: FloatArray, inside: Tensor, p_gripper_held: FloatArray
+) -> Region:
+    """The region on the full cloud: every point belongs as much as the nearest of `nodes` (N, 3) does."""
+    cloud = step.before.cloud
+    weight = np.zeros(len(nodes))
+    weight[inside] = np.maximum(probability[inside], 1e-3)
+    owner = nearest(cloud.points, nodes)[1][:, 0]
+    member = weight[owner] > 0
+    # The bare table is found everywhere.
+    standing = ~step.before.ground.bare
+    member = member & standing if (member & standing).sum() >= FEWEST else member
+    p_held = se3.apply(step.before.observation.T_world_gripper, p_gripper_held)
+    in_hand = within(cloud.points, p_held, SAME)
+    # A step that lets go is fixed to what stays, not to what is let go.
+    most = LETS_GO if step.action.gripper_open else 0.5
+    if (member & ~in_hand).sum() >= FEWEST and in_hand[member].mean() < most:
+        member = member & ~in_hand
+    else:
+        in_hand, p_gripper_held = np.zeros(len(cloud), dtype=bool), p_gripper_held[:0]
+    region = cloud.select(member)
+    free = np.flatnonzero(standing & ~in_hand | member)
+    labels, own = connected(cloud.points[free]), member[free]
+    # What only stands by says nothing about the region.
+    around = ~own & np.isin(labels, labels[own]) & within(cloud.points[free], region.points, AROUND)
+    context = cloud.select(free[around]) if around.any() else None
+    return Region(region, weight[owner[member]], p_gripper_held, context, firm=True)
+
+
+def _taken(step: Transition, region: Region, p_taken: FloatArray) -> Region | None:
+    """What the hand takes next, at points (H, 3), if the region is much more than that."""
+    if len(p_taken) < SMALLEST or within(p_taken, region.cloud.points, SAME).mean() < KNOWN:
+        return None
+    cloud = step.before.cloud.select(within(step.before.cloud.points, p_taken, NEXT))
+    if len(cloud) < SMALLEST or within(region.cloud.points, cloud.points, SAME).mean() > MUCH_MORE:
+        return None
+    return Region(cloud, np.ones(len(cloud)), region.p_gripper_held, firm=True)
