@@ -1,7 +1,7 @@
 """Point clouds in the world frame: fused from views, cropped, thinned, with normals."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import fpsample
 import numpy as np
@@ -47,6 +47,10 @@ class PointCloud:
             None if self.normals is None else self.normals[which],
             None if self.ids is None else self.ids[which],
         )
+
+    def colorless(self) -> "PointCloud":
+        """The same points, all black."""
+        return replace(self, colors=np.zeros_like(self.colors))
 
 
 def unproject(view: CameraView) -> FloatArray:

@@ -1,7 +1,7 @@
 """How well a moved region explains an observed scene: points, normals, colours and free space."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -94,8 +94,7 @@ class Surface:
 
     def colorless(self) -> "Surface":
         """The same shape, all of one colour."""
-        gray = replace(self.cloud, colors=np.zeros_like(self.cloud.colors))
-        return Surface(gray, self._views, self.tolerances)
+        return Surface(self.cloud.colorless(), self._views, self.tolerances)
 
     @cached_property
     def sample(self) -> PointCloud:

@@ -12,27 +12,25 @@ from functools import cached_property, partial
 
 import numpy as np
 import torch
-from torch import Tensor
 
-from imop.geometry.cloud import farthest_points
-from imop.geometry.neighbours import within
+from imop.geometry.cloud import PointCloud
+from imop.geometry.neighbours import nearest, within
 from imop.networks.graph import Graph, build_graph
-from imop.networks.matching import reposition
 from imop.networks.model import Model
 from imop.policy.contacts import GRASP, SAME
 from imop.policy.evidence import Surface
 from imop.policy.learned_region import FEWEST, ShownRegion, find_shown_regions
 from imop.policy.matcher import Hypothesis, Scene, Transition
-from imop.policy.matches import Matches, likeliest
+from imop.policy.matches import Matches
 from imop.policy.refine import SMALLEST
-from imop.policy.region import ENOUGH, Region
-from imop.policy.search import Inquiry, Search, SearchConfig, upright_motions
-from imop.policy.symmetry import equal_turns
-from imop.policy.things import Things, middle, without_held
+from imop.policy.region import Region
+from imop.policy.search import Inquiry, Search
+from imop.policy.sought import Sought, SoughtConfig, nodes_at
+from imop.policy.things import Things, without_held
 from imop.types import FloatArray
 
-# Matches nearer than this to where a motion carries them speak for it, metres; `TIGHT` for a part.
-LOOSE, TIGHT = 0.03, 0.015
+# Matches of a part nearer than this to where a motion carries them speak for it, metres.
+TIGHT = 0.015
 # A region that no motion explains better than this may have bent. What of it is within `NEXT_TO` metres of
 # where the gripper goes has not. It is found instead if this share of its matches speaks for that, if they
 # support the whole less than this share of what they support the part, if it is explained there better than
@@ -41,6 +39,8 @@ BENT = 0.7
 NEXT_TO = 0.05
 CERTAIN, CONTRADICTED = 0.8, 0.9
 BETTER, AS_GOOD = 0.1, 0.85
+# A region that no motion explains better than this may have another colour.
+LOST = 0.45
 # How many of the best motions compete with those to all other things.
 KEPT = 6
 
@@ -52,105 +52,35 @@ class LearnedMatcher:
     Attributes:
         model: the networks; see `networks.model.load_model`.
         threshold: least probability of a region point.
-        candidates: query points per region point that may be matched.
-        trusted: share of the matches from which the motion that most agree on is looked at before all others.
-        samples: triples drawn from the matches.
-        places: things of the query on which the region is set upright, too.
-        turns: how often, over a full turn.
-        search: how the motions are refined and judged.
-        seed: of the sampling.
+        sought: how regions are looked for.
     """
 
     model: Model
     threshold: float = 0.5
-    candidates: int = 2
-    trusted: float = 0.5
-    samples: int = 4000
-    places: int = 2
-    turns: int = 24
-    search: SearchConfig = field(
-        default_factory=lambda: SearchConfig(finished=2, righted=3, turned=4, turn=0.05, sure=0.72)
-    )
-    seed: int = 0
+    sought: SoughtConfig = field(default_factory=SoughtConfig)
 
     def prepare(self, steps: Sequence[Transition]) -> list["LearnedStep"]:
         """Find the regions of a demonstration's steps and describe them."""
         shown = find_shown_regions(self.model, steps, self.threshold)
-        return [LearnedStep(self, step, region) for step, region in zip(steps, shown, strict=True)]
-
-
-class Sought:
-    """One region of a demonstrated step, as the matching network and the search look for it."""
-
-    def __init__(
-        self, matcher: LearnedMatcher, before: Scene, shown: ShownRegion, described: Tensor, region: Region
-    ) -> None:
-        self._matcher, self._graph, self._described = matcher, shown.graph, described
-        self.region = region
-        inside = shown.inside if region is shown.region else _nodes(shown.graph, region)
-        few = farthest_points(shown.graph.points[inside].double().numpy(), self._most)
-        self._chosen = inside[torch.from_numpy(few).sort().values]
-        self._probability = shown.probability[self._chosen].double().numpy()
-        self.search = Search(matcher.search, before, region)
-        self._middles = [middle(region.cloud.points)]
-        if region.context is not None:
-            self._middles.append(middle(region.whole.points))
-        self._turns = equal_turns(self.search.template.surface.colorless(), self._middles[0])
-
-    @property
-    def _most(self) -> int:
-        return self._matcher.model.config.matching.max_region
-
-    def matched(self, seen: Graph) -> tuple[Matches, FloatArray]:
-        """The network's matches in a query, and the motions (H, 4, 4) that most of them agree on."""
-        with torch.inference_mode():
-            found = self._matcher.model.matching(self._graph, self._chosen, seen, self._described)
-        C, candidates = found.last[0], self._matcher.candidates
-        matches = likeliest(C, self._graph, self._chosen, seen, self._probability, candidates)
-        return matches, reposition(found.last, found.p_region, found.p_query).double().numpy()
-
-    def trusted(self, m: Matches, fit: FloatArray, hints: Sequence[FloatArray]) -> list[FloatArray]:
-        """Motions worth a look before a search; none if many turns are equal, for then a few compete."""
-        if len(self._turns) > 1:
-            return []
-        agreed = m.agreement(fit)[0] > self._matcher.trusted
-        return [*hints, *fit] if agreed else list(hints)
-
-    def opinion(self, m: Matches, T: FloatArray, tolerance: float = LOOSE) -> FloatArray:
-        """(H,) share of the matches that speak for motions (H, 4, 4), in any of the turns of equal shape.
-
-        Of a round jar the networks match any side to any; its label is for the judge.
-        """
-        turned = (T[:, None] @ self._turns).reshape(-1, 4, 4)
-        support: FloatArray = m.agreement(turned, tolerance).reshape(len(T), -1).max(axis=1)
-        return support
-
-    def seeds(self, m: Matches, things: Things) -> FloatArray:
-        """(H, 4, 4) motions that matches speak for."""
-        matcher = self._matcher
-        agreed = m.motions(matcher.samples, matcher.seed)
-        upright = m.upright(things, matcher.places, matcher.turns, self._middles)
-        return np.concatenate([agreed, upright])
-
-    def anywhere(self, things: Things) -> FloatArray:
-        """(H, 4, 4) motions, in every turn, to every thing there is: the matches may be of a wrong one."""
-        places, turns = things.places(ENOUGH), self._matcher.turns
-        return np.concatenate([upright_motions(center, places, turns) for center in self._middles])
+        return [
+            LearnedStep(self.model, self.sought, step, region)
+            for step, region in zip(steps, shown, strict=True)
+        ]
 
 
 class LearnedStep:
     """A demonstrated step prepared for the matching network."""
 
-    def __init__(self, matcher: LearnedMatcher, step: Transition, shown: ShownRegion) -> None:
-        self._config, self._model, self._before = matcher.search, matcher.model, step.before
+    def __init__(self, model: Model, config: SoughtConfig, step: Transition, shown: ShownRegion) -> None:
+        self._model, self._config, self._before = model, config, step.before
         with torch.inference_mode():
-            described = self._model.matching.backbone(shown.graph)
-        region = shown.region
-        self._sought = Sought(matcher, step.before, shown, described, region)
-        self._taken = None
-        if shown.taken is not None and len(_nodes(shown.graph, shown.taken)) >= FEWEST:
-            self._taken = Sought(matcher, step.before, shown, described, shown.taken)
-            rest = region.whole.select(~within(region.whole.points, shown.taken.cloud.points, SAME))
+            described = model.matching.backbone(shown.graph)
+        prepare = partial(Sought, config, model, step.before, shown, described)
+        region, taken = shown.region, shown.taken
+        self._sought, self._taken = prepare(region), None
+        if taken is not None and len(nodes_at(shown.graph, taken)) >= FEWEST:
+            self._taken = prepare(taken)
+            rest = region.whole.select(~within(region.whole.points, taken.cloud.points, SAME))
             self._rest = Surface(rest, ())
         self._part = region.next_to(step.action.T_world_gripper[:3, 3], NEXT_TO)
         tip = step.before.observation.T_world_gripper[None, :3, 3]
@@ -159,7 +89,7 @@ class LearnedStep:
     @cached_property
     def _search_part(self) -> Search:
         """Few steps need it, and it takes as long to prepare as that of the region."""
-        return Search(self._config, self._before, self._part)
+        return Search(self._config.search, self._before, self._part)
 
     @property
     def region(self) -> FloatArray:
@@ -178,7 +108,8 @@ class LearnedStep:
         matches, fit = self._sought.matched(seen)
         inquiry = Inquiry(self._sought.search, things, hints, partial(self._sought.opinion, matches))
         whole = self._whole(matches, fit, inquiry)
-        return whole if self._taken is None else self._loose(self._taken, seen, inquiry, whole)
+        found = whole if self._taken is None else self._loose(self._taken, seen, inquiry, whole)
+        return found if found[0].score > LOST else self._recolored(inquiry, found)
 
     def _whole(self, matches: Matches, fit: FloatArray, inquiry: Inquiry) -> tuple[Hypothesis, ...]:
         """Where the whole region is, or the part of it that is next to the gripper."""
@@ -213,6 +144,31 @@ class LearnedStep:
         )
         return found if found[0].score > there.score + BETTER else whole
 
+    def _recolored(self, inquiry: Inquiry, found: tuple[Hypothesis, ...]) -> tuple[Hypothesis, ...]:
+        """What is of the same shape in another colour, rather not in that of another thing shown.
+
+        Where the cups other than the red one have new colours, the red one is still not one of them.
+        """
+        sought, things = self._taken or self._sought, inquiry.things
+        seeds = [np.stack([h.T_query_support for h in found[:KEPT]]), sought.anywhere(things)]
+        gray = Inquiry(sought.search_colorless, things.colorless(), inquiry.hints)
+        shaped = gray.search(np.concatenate(seeds))
+        if shaped[0].score < BENT:
+            return found
+        known = things.colored_like(self._beside(sought.region))
+        points = things.cloud.points
+
+        def another(hypothesis: Hypothesis) -> bool:
+            return bool(known[nearest(hypothesis.p_query, points)[1][:, 0]].mean() > 0.5)
+
+        good = [hypothesis for hypothesis in shaped if hypothesis.score > BENT]
+        return tuple(sorted(good, key=another))
+
+    def _beside(self, region: Region) -> PointCloud:
+        """What else than a region stood in the demonstrated scene."""
+        cloud = self._before.cloud
+        return cloud.select(~self._before.ground.bare & ~within(cloud.points, region.cloud.points, SAME))
+
     def _unbent(
         self, matches: Matches, inquiry: Inquiry, whole: tuple[Hypothesis, ...]
     ) -> tuple[Hypothesis, ...]:
@@ -245,9 +201,3 @@ class LearnedStep:
         contradicted = for_whole < CONTRADICTED * self._sought.opinion(near, T_part[None], TIGHT)[0]
         explained = max(AS_GOOD * whole[0].score, closer.finished(T_whole).score + BETTER)
         return part if certain and contradicted and part[0].score > explained else whole
-
-
-def _nodes(graph: Graph, region: Region) -> Tensor:
-    """(R,) points of the graph that a region is at."""
-    near = within(graph.points.double().numpy(), region.cloud.points, SAME)
-    return torch.from_numpy(np.flatnonzero(near))

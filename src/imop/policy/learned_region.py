@@ -15,8 +15,7 @@ from imop.networks.region import StepBatch, one_step
 from imop.policy.contacts import SAME, Contacts, find_contacts, is_open
 from imop.policy.matcher import Transition
 from imop.policy.objects import connected, find_objects
-from imop.policy.refine import SMALLEST
-from imop.policy.region import Region, find_region
+from imop.policy.region import ENOUGH, Region, find_region
 from imop.types import FloatArray
 
 # A region of fewer points cannot be matched.
@@ -139,9 +138,9 @@ def _dense(
 
 def _taken(step: Transition, region: Region, p_taken: FloatArray) -> Region | None:
     """What the hand takes next, at points (H, 3), if the region is much more than that."""
-    if len(p_taken) < SMALLEST or within(p_taken, region.cloud.points, SAME).mean() < KNOWN:
+    if len(p_taken) < ENOUGH or within(p_taken, region.cloud.points, SAME).mean() < KNOWN:
         return None
     cloud = step.before.cloud.select(within(step.before.cloud.points, p_taken, NEXT))
-    if len(cloud) < SMALLEST or within(region.cloud.points, cloud.points, SAME).mean() > MUCH_MORE:
+    if len(cloud) < ENOUGH or within(region.cloud.points, cloud.points, SAME).mean() > MUCH_MORE:
         return None
     return Region(cloud, np.ones(len(cloud)), region.p_gripper_held, firm=True)

@@ -7,7 +7,7 @@ repeated too often to be found again (a drawer's handle looks like the other dra
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -56,6 +56,11 @@ class Region:
     def whole(self) -> PointCloud:
         """The region, then its context."""
         return self.cloud if self.context is None else concatenate([self.cloud, self.context])
+
+    def colorless(self) -> "Region":
+        """The same region without its colours."""
+        context = None if self.context is None else self.context.colorless()
+        return replace(self, cloud=self.cloud.colorless(), context=context)
 
     def next_to(self, p: FloatArray, reach: float) -> "Region":
         """What of the region is nearer than `reach` (metres) to its point nearest to `p` (3,), alone."""

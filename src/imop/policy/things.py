@@ -7,17 +7,20 @@ from numpy.typing import NDArray
 
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud
-from imop.geometry.neighbours import within
+from imop.geometry.neighbours import nearest, within
 from imop.policy.contacts import SAME
-from imop.policy.evidence import Surface
+from imop.policy.evidence import Surface, shades
 from imop.policy.matcher import Scene
 from imop.policy.objects import connected
 from imop.policy.refine import SMALLEST, Refiner
 from imop.policy.region import Region
-from imop.types import FloatArray
+from imop.types import BoolArray, FloatArray
 
 # A point belongs to a surface that explains it as well as this.
 EXPLAINED = 0.2
+
+# Shades (see `evidence.shades`) nearer to each other than this are of one colour.
+LIKE = 0.1
 
 
 class Things:
@@ -45,6 +48,17 @@ class Things:
         points, labels = self.cloud.points, self.labels
         large = np.flatnonzero(np.bincount(labels) >= fewest)
         return np.array([middle(points[labels == label]) for label in large]).reshape(-1, 3)
+
+    def colored_like(self, cloud: PointCloud) -> BoolArray:
+        """(N,) which points have a colour that occurs in a cloud."""
+        if not len(cloud):
+            return np.zeros(len(self.cloud), dtype=bool)
+        away, _ = nearest(shades(self.cloud.colors), shades(cloud.colors))
+        return np.asarray(away[:, 0] < LIKE)
+
+    def colorless(self) -> "Things":
+        """The same without colours."""
+        return Things(self.query, self.cloud.colorless())
 
     def unexplained(self, by: Surface, T_query_support: FloatArray) -> "Things | None":
         """What a moved surface leaves to be explained; None if that is next to nothing."""

@@ -1,0 +1,137 @@
+"""One region of a demonstrated step, as the matching network and the search look for it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from imop.geometry.cloud import farthest_points
+from imop.geometry.neighbours import within
+from imop.networks.graph import Graph
+from imop.networks.matching import reposition
+from imop.networks.model import Model
+from imop.policy.contacts import SAME
+from imop.policy.learned_region import ShownRegion
+from imop.policy.matcher import Scene
+from imop.policy.matches import Matches, likeliest
+from imop.policy.region import ENOUGH, Region
+from imop.policy.search import Search, SearchConfig, upright_motions
+from imop.policy.symmetry import equal_turns
+from imop.policy.things import Things, middle
+from imop.types import FloatArray
+
+# Matches nearer than this to where a motion carries them speak for it, metres.
+LOOSE = 0.03
+
+
+@dataclass(frozen=True)
+class SoughtConfig:
+    """How matches become motions.
+
+    Attributes:
+        candidates: query points per region point that may be matched.
+        trusted: share of the matches from which the motion that most agree on is looked at before all others.
+        samples: triples drawn from the matches.
+        places: things of the query on which the region is set upright, too.
+        turns: how often, over a full turn.
+        search: how the motions are refined and judged.
+        seed: of the sampling.
+    """
+
+    candidates: int = 2
+    trusted: float = 0.5
+    samples: int = 4000
+    places: int = 2
+    turns: int = 24
+    search: SearchConfig = field(
+        default_factory=lambda: SearchConfig(finished=2, righted=3, turned=4, turn=0.05, sure=0.72)
+    )
+    seed: int = 0
+
+
+class Sought:
+    """A region, prepared for any number of queries.
+
+    Args:
+        config: how to look for it.
+        model: with the matching network.
+        before: the demonstrated scene.
+        shown: its graph and its region.
+        described: of the graph, by the matching network's backbone.
+        region: what is looked for; `shown.region` or a part of it.
+
+    Attributes:
+        region: the same.
+        search: of it.
+    """
+
+    def __init__(
+        self,
+        config: SoughtConfig,
+        model: Model,
+        before: Scene,
+        shown: ShownRegion,
+        described: Tensor,
+        region: Region,
+    ) -> None:
+        self._config, self._model, self._before = config, model, before
+        self._graph, self._described, self.region = shown.graph, described, region
+        inside = shown.inside if region is shown.region else nodes_at(shown.graph, region)
+        few = farthest_points(shown.graph.points[inside].double().numpy(), model.config.matching.max_region)
+        self._chosen = inside[torch.from_numpy(few).sort().values]
+        self._probability = shown.probability[self._chosen].double().numpy()
+        self.search = Search(config.search, before, region)
+        self._middles = [middle(region.cloud.points)]
+        if region.context is not None:
+            self._middles.append(middle(region.whole.points))
+        self._turns = equal_turns(self.search.template.surface.colorless(), self._middles[0])
+
+    @cached_property
+    def search_colorless(self) -> Search:
+        """What is needed where no motion explains the region with its colours."""
+        return Search(self._config.search, self._before, self.region.colorless())
+
+    def matched(self, seen: Graph) -> tuple[Matches, FloatArray]:
+        """The network's matches in a query, and the motions (H, 4, 4) that most of them agree on."""
+        with torch.inference_mode():
+            found = self._model.matching(self._graph, self._chosen, seen, self._described)
+        C, candidates = found.last[0], self._config.candidates
+        matches = likeliest(C, self._graph, self._chosen, seen, self._probability, candidates)
+        return matches, reposition(found.last, found.p_region, found.p_query).double().numpy()
+
+    def trusted(self, m: Matches, fit: FloatArray, hints: Sequence[FloatArray]) -> list[FloatArray]:
+        """Motions worth a look before a search; none if many turns are equal, for then a few compete."""
+        if len(self._turns) > 1:
+            return []
+        agreed = m.agreement(fit)[0] > self._config.trusted
+        return [*hints, *fit] if agreed else list(hints)
+
+    def opinion(self, m: Matches, T: FloatArray, tolerance: float = LOOSE) -> FloatArray:
+        """(H,) share of the matches that speak for motions (H, 4, 4), in any of the turns of equal shape.
+
+        Of a round jar the networks match any side to any; its label is for the judge.
+        """
+        turned = (T[:, None] @ self._turns).reshape(-1, 4, 4)
+        support: FloatArray = m.agreement(turned, tolerance).reshape(len(T), -1).max(axis=1)
+        return support
+
+    def seeds(self, m: Matches, things: Things) -> FloatArray:
+        """(H, 4, 4) motions that matches speak for."""
+        config = self._config
+        agreed = m.motions(config.samples, config.seed)
+        upright = m.upright(things, config.places, config.turns, self._middles)
+        return np.concatenate([agreed, upright])
+
+    def anywhere(self, things: Things) -> FloatArray:
+        """(H, 4, 4) motions, in every turn, to every thing there is: the matches may be of a wrong one."""
+        places, turns = things.places(ENOUGH), self._config.turns
+        return np.concatenate([upright_motions(center, places, turns) for center in self._middles])
+
+
+def nodes_at(graph: Graph, region: Region) -> Tensor:
+    """(R,) points of the graph that a region is at."""
+    near = within(graph.points.double().numpy(), region.cloud.points, SAME)
+    return torch.from_numpy(np.flatnonzero(near))
