@@ -39,6 +39,8 @@ BENT = 0.7
 NEXT_TO = 0.05
 CERTAIN, CONTRADICTED = 0.8, 0.9
 BETTER, AS_GOOD = 0.1, 0.85
+# What the hand takes is somewhere else than the region says only if it is explained there by this score.
+FOUND = 0.6
 # A region that no motion explains better than this may have another colour.
 LOST = 0.45
 # How many of the best motions compete with those to all other things.
@@ -142,7 +144,7 @@ class LearnedStep:
         found = alone.search(
             np.concatenate([T_whole[None], fit, taken.seeds(matches, left), taken.anywhere(left)])
         )
-        return found if found[0].score > there.score + BETTER else whole
+        return found if found[0].score > max(FOUND, there.score + BETTER) else whole
 
     def _recolored(self, inquiry: Inquiry, found: tuple[Hypothesis, ...]) -> tuple[Hypothesis, ...]:
         """What is of the same shape in another colour, rather not in that of another thing shown.
