@@ -111,7 +111,9 @@ class LearnedStep:
         inquiry = Inquiry(self._sought.search, things, hints, partial(self._sought.opinion, matches))
         whole = self._whole(matches, fit, inquiry)
         found = whole if self._taken is None else self._loose(self._taken, seen, inquiry, whole)
-        return found if found[0].score > LOST else self._recolored(inquiry, found)
+        # What is in the hand is where the hand is, whatever its colour.
+        known = self._in_hand or found[0].score > LOST
+        return found if known else self._recolored(inquiry, found)
 
     def _whole(self, matches: Matches, fit: FloatArray, inquiry: Inquiry) -> tuple[Hypothesis, ...]:
         """Where the whole region is, or the part of it that is next to the gripper."""
