@@ -52,7 +52,8 @@ class EpisodeLog:
 
     def __init__(self, path: Path):
         self._path = path
-        self._episodes = {(e.trial, e.method, e.state): e for e in _read(path)}
+        _cut(path)
+        self._episodes = {(e.trial, e.method, e.state): e for e in read_episodes(path)}
 
     def find(self, trial: Trial, method: str, state: str) -> Episode | None:
         """The episode, or None if it was not tried in this state."""
@@ -76,15 +77,13 @@ def method_state(method: str, weights: Path | None) -> str:
     return "-".join([world, policy, *([weights_digest(weights or BUNDLED)] if learned else [])])
 
 
-def _read(path: Path) -> Iterator[Episode]:
-    if not path.is_file():
-        return
-    text = path.read_bytes()
-    whole = text[: text.rfind(b"\n") + 1]
-    if len(whole) < len(text):
-        # Stopped in the middle of a line: what follows must begin on a new one.
-        with path.open("r+b") as file:
-            file.truncate(len(whole))
+def read_episodes(path: Path) -> Iterator[Episode]:
+    """The episodes of a file, in order; none if there is no file. A last line without an end is left out.
+
+    Raises:
+        CorruptData: if a line cannot be read.
+    """
+    whole = path.read_bytes().rpartition(b"\n")[0] if path.is_file() else b""
     for number, line in enumerate(whole.splitlines(), start=1):
         try:
             fields = json.loads(line)
@@ -94,3 +93,11 @@ def _read(path: Path) -> Iterator[Episode]:
         except (ValueError, TypeError, dacite.DaciteError) as error:
             problem = f"line {number} is no episode ({error})"
             raise CorruptData(path, problem, "lines as `imop eval` writes them") from error
+
+
+def _cut(path: Path) -> None:
+    """Remove a last line without an end: what follows must begin on a new one."""
+    text = path.read_bytes() if path.is_file() else b""
+    if not text.endswith(b"\n") and text:
+        with path.open("r+b") as file:
+            file.truncate(text.rfind(b"\n") + 1)

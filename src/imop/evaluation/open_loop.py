@@ -239,8 +239,18 @@ def _overlap(case: Case, step: int, region: FloatArray) -> float | None:
 def region_iou(region: FloatArray, observation: Observation, instance: str) -> float | None:
     """Intersection over union of a region and of what is seen of an instance.
 
-    Does not depend on how densely the region is sampled: it follows from the share of the region's points
-    that lie on the instance and the share of the instance that lies near the region.
+    Does not depend on how densely the region is sampled: it follows from both shares of `region_shares`,
+    which see for the arguments. None if they are unknown.
+    """
+    shares = region_shares(region, observation, instance)
+    if shares is None:
+        return None
+    precision, recall = shares
+    return precision * recall / (precision + recall - precision * recall) if precision and recall else 0.0
+
+
+def region_shares(region: FloatArray, observation: Observation, instance: str) -> tuple[float, float] | None:
+    """The share of a region that lies on an instance, and that of the instance that lies near the region.
 
     Args:
         region: (M, 3) points, world frame.
@@ -248,7 +258,7 @@ def region_iou(region: FloatArray, observation: Observation, instance: str) -> f
         instance: name of one of its instances.
 
     Returns:
-        0 .. 1, or None if nothing is seen of the instance or the ids are unknown.
+        0 .. 1 each, or None if nothing is seen of the instance or the ids are unknown.
     """
     cloud = clouds.crop(clouds.fuse(observation), WORKSPACE_LOWER, WORKSPACE_UPPER)
     names = observation.instance_names or {}
@@ -256,9 +266,8 @@ def region_iou(region: FloatArray, observation: Observation, instance: str) -> f
     if cloud.ids is None or not np.isin(cloud.ids, numbers).any():
         return None
     if not len(region):
-        return 0.0
+        return 0.0, 0.0
     _, index = nearest(region, cloud.points)
     precision = float(np.isin(cloud.ids[index[:, 0]], numbers).mean())
     seen = clouds.voxel_downsample(cloud.select(np.isin(cloud.ids, numbers)), THINNED)
-    recall = float(within(seen.points, region, COVERED).mean())
-    return precision * recall / (precision + recall - precision * recall) if precision and recall else 0.0
+    return precision, float(within(seen.points, region, COVERED).mean())

@@ -70,9 +70,10 @@ class Search:
         config: how.
         before: the demonstrated scene.
         region: of the step, in that scene.
+        loose: whether the region is a thing of its own, whatever it touches.
     """
 
-    def __init__(self, config: SearchConfig, before: Scene, region: Region) -> None:
+    def __init__(self, config: SearchConfig, before: Scene, region: Region, loose: bool = False) -> None:
         self.config, self.region = config, region
         self.template = Template(region, tuple(before.observation.views.values()))
         self.center = region.cloud.points.mean(axis=0)
@@ -82,7 +83,7 @@ class Search:
             # A thin part slides along itself; what it is fixed to holds it.
             self.coarse.append(region.whole.points[farthest_points(region.whole.points, 600)])
         self.fine = region.cloud.points[farthest_points(region.cloud.points, 1500)]
-        self.half_turn = half_turn(self._thing(before))
+        self.half_turn = half_turn(region.cloud.points if loose else self._thing(before))
 
     def _thing(self, before: Scene) -> FloatArray:
         """(N, 3) the thing in the demonstrated scene that the region is part of."""

@@ -83,7 +83,8 @@ class Sought:
         few = farthest_points(shown.graph.points[inside].double().numpy(), model.config.matching.max_region)
         self._chosen = inside[torch.from_numpy(few).sort().values]
         self._probability = shown.probability[self._chosen].double().numpy()
-        self.search = Search(config.search, before, region)
+        self._loose = region is not shown.region
+        self.search = Search(config.search, before, region, self._loose)
         self._middles = [middle(region.cloud.points)]
         if region.context is not None:
             self._middles.append(middle(region.whole.points))
@@ -92,7 +93,7 @@ class Sought:
     @cached_property
     def search_colorless(self) -> Search:
         """What is needed where no motion explains the region with its colours."""
-        return Search(self._config.search, self._before, self.region.colorless())
+        return Search(self._config.search, self._before, self.region.colorless(), self._loose)
 
     def matched(self, seen: Graph) -> tuple[Matches, FloatArray]:
         """The network's matches in a query, and the motions (H, 4, 4) that most of them agree on."""
