@@ -5,7 +5,7 @@ import numpy as np
 from imop.geometry import se3
 from imop.policy.contacts import find_contacts
 from imop.policy.objects import find_objects
-from tests.policy.scenes import RED, TABLE, above, at, box, moved, scene, transitions
+from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, moved, scene, transitions
 
 CUBE = (0.05, 0.05, 0.05)
 GRASP = above(0.1, 0.1, TABLE + 0.04)
@@ -49,3 +49,37 @@ def test_closing_and_opening_in_the_air_are_no_events():
     scenes = [scene([box(CUBE, RED, at(0.1, 0.1))], T, w) for T, w in ((HIGH, 1.0), (HIGH, 0.0), (LIFT, 1.0))]
     found = contacts_of(scenes, [(HIGH, False), (LIFT, True)])
     assert not found.event.any() and not found.holding.any() and found.following(0) is None
+
+
+def test_what_the_next_grasp_takes_is_known_before_it():
+    cube, button = box(CUBE, RED, at(0.1, 0.1)), box((0.03, 0.03, 0.02), BLUE, at(0.4, -0.2))
+    lifted, carried = (moved(cube, T @ se3.invert(GRASP)) for T in (LIFT, HIGH))
+    above_cube = above(0.1, 0.1, TABLE + 0.15)
+    scenes = [
+        scene([cube, button], HIGH),
+        scene([cube, button], above_cube),
+        scene([cube, button], GRASP, 0.6),
+        scene([lifted, button], LIFT, 0.6),
+        scene([carried, button], HIGH, 1.0),
+    ]
+    actions = [(above_cube, True), (GRASP, False), (LIFT, False), (HIGH, True)]
+    steps, found = transitions(scenes, actions), contacts_of(scenes, actions)
+    for k in (0, 1):
+        taken = found.taken(k, steps)
+        np.testing.assert_allclose(taken.mean(axis=0), cube.points.mean(axis=0), atol=0.01)
+    assert not len(found.taken(2, steps)) and not len(found.taken(3, steps))
+
+
+def test_a_retreat_from_what_was_pressed_does_not_go_to_take_anything():
+    cube, button = box(CUBE, RED, at(0.1, 0.1)), box((0.03, 0.03, 0.02), BLUE, at(0.4, -0.2))
+    press, away = above(0.4, -0.2, TABLE + 0.02), above(0.4, -0.2, TABLE + 0.15)
+    scenes = [
+        scene([cube, button], HIGH, 0.0),
+        scene([cube, button], press, 0.0),
+        scene([cube, button], away, 1.0),
+        scene([cube, button], GRASP, 0.6),
+        scene([moved(cube, LIFT @ se3.invert(GRASP)), button], LIFT, 0.6),
+    ]
+    actions = [(press, False), (away, True), (GRASP, False), (LIFT, False)]
+    steps, found = transitions(scenes, actions), contacts_of(scenes, actions)
+    assert [len(found.taken(k, steps)) > 0 for k in range(4)] == [True, False, True, False]

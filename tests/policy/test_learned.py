@@ -6,7 +6,7 @@ import pytest
 from imop.geometry import se3
 from imop.networks.model import load_model
 from imop.policy.learned import LearnedMatcher
-from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, moved, scene, transitions
+from tests.policy.scenes import BLUE, GREEN, RED, TABLE, above, at, box, moved, scene, transitions
 
 HOME = above(0.0, -0.3, 1.2)
 GRASP = above(0.1, 0.1, TABLE + 0.05)
@@ -59,7 +59,7 @@ def test_the_same_question_has_the_same_answer(matcher):
     assert np.array_equal(first[0].T_query_support, second[0].T_query_support)
 
 
-GRAY = (0.5, 0.5, 0.5)
+GRAY, YELLOW = (0.5, 0.5, 0.5), (0.8, 0.7, 0.1)
 
 
 def chain(side):
@@ -87,3 +87,36 @@ def test_a_query_without_points_gives_no_hypothesis(matcher):
     query = scene([], HOME)
     empty = type(query)(query.observation, query.cloud.select(np.arange(0)))
     assert matcher.prepare(steps())[0].match(empty) == ()
+
+
+def test_what_is_taken_is_found_where_it_moved_on_what_carries_it(matcher):
+    def chest_with(note, T):
+        return [moved(box((0.24, 0.2, 0.1), GRAY, at(0.1, 0.1)), T), moved(note, T)]
+
+    top = TABLE + 0.1
+    note = box((0.09, 0.05, 0.02), RED, at(0.05, 0.05, top))
+    grasp, lift = above(0.05, 0.05, top + 0.015), above(0.05, 0.05, top + 0.25)
+    lifted = moved(note, lift @ se3.invert(grasp))
+    shown = [
+        scene(chest_with(note, np.eye(4)), HOME),
+        scene(chest_with(note, np.eye(4)), grasp, 0.5),
+        scene([chest_with(note, np.eye(4))[0], lifted], lift, 0.5),
+    ]
+    step = matcher.prepare(transitions(shown, [(grasp, False), (lift, False)]))[0]
+    T = at(0.05, -0.1, 0.0, yaw=0.3)
+    T_slid = at(0.15, 0.13, top, yaw=0.4) @ se3.invert(at(0.05, 0.05, top))
+    query = scene(chest_with(moved(note, T_slid), T), HOME)
+    best = step.match(query)[0].T_query_support
+    assert se3.translation_distance(best @ grasp, T @ T_slid @ grasp) < 0.015
+
+
+@pytest.mark.parametrize(
+    ("color", "other", "new"), [(RED, GREEN, BLUE), (BLUE, YELLOW, RED), (GREEN, YELLOW, BLUE)]
+)
+def test_what_has_a_new_colour_is_found_by_its_shape_and_not_in_that_of_another(matcher, color, other, new):
+    shown = [box(SIZE, color, at(0.1, 0.1)), box(SIZE, other, at(0.35, -0.15))]
+    step = matcher.prepare(transitions([scene(shown, HOME), scene(shown, GRASP, 0.5)], [(GRASP, False)]))[0]
+    for x, y in ((0.3, 0.2), (0.0, 0.2)):
+        asked = [box(SIZE, new, at(x, y)), box(SIZE, other, at(0.2, -0.1))]
+        best = step.match(scene(asked, HOME))[0].T_query_support
+        assert se3.translation_distance(best @ GRASP, above(x, y, TABLE + 0.05)) < 0.02

@@ -4,9 +4,10 @@ import numpy as np
 
 from imop.geometry import se3
 from imop.geometry.cloud import concatenate
+from imop.policy.evidence import Surface
 from imop.policy.region import Region
 from imop.policy.things import Things, middle, without_held
-from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, scene
+from tests.policy.scenes import BLUE, GREY, RED, TABLE, above, at, box, moved, scene
 
 HOME = above(0.2, 0.1, 1.0)
 CUBE = (0.04, 0.04, 0.04)
@@ -36,3 +37,28 @@ def test_what_is_in_the_hand_is_left_out_unless_it_is_the_region():
     left = without_held(query.cloud, query, region)
     assert left.points[:, 2].max() < TABLE + 0.05 and len(left) == len(query.cloud) - len(held)
     assert without_held(query.cloud, query, Region(held, np.ones(len(held)), p_held[:0])) is query.cloud
+
+
+def test_what_lies_on_a_surface_and_differs_from_it_is_left():
+    chest, note = box((0.2, 0.2, 0.1), GREY, at(0.1, 0.1)), box((0.08, 0.04, 0.01), RED, at(0.05, 0.12, 0.85))
+    things = Things(scene([], HOME), concatenate([chest, note]))
+    T = at(0.3, -0.2, 0.0, yaw=0.5)
+    surface = Surface(moved(chest, se3.invert(T)), ())
+    left = things.unexplained(surface, T)
+    assert left is not None
+    red = left.cloud.colors[:, 0] > 0.7
+    assert red.sum() > 0.9 * len(note) and (~red).sum() < 0.02 * len(chest)
+    np.testing.assert_allclose(left.places(len(note) // 2)[0], middle(note.points), atol=0.005)
+
+
+def test_a_surface_that_explains_everything_leaves_nothing():
+    chest = box((0.2, 0.2, 0.1), GREY, at(0.1, 0.1))
+    assert Things(scene([], HOME), chest).unexplained(Surface(chest, ()), np.eye(4)) is None
+
+
+def test_colours_are_found_again_and_can_be_left_out():
+    red, blue = box(CUBE, RED, at(0.1, 0.1)), box(CUBE, BLUE, at(0.3, 0.1))
+    things = Things(scene([], HOME), concatenate([red, blue]))
+    assert things.colored_like(blue).tolist() == [False] * len(red) + [True] * len(blue)
+    assert not things.colored_like(blue.select(np.arange(0))).any()
+    assert things.colorless().colored_like(red.colorless()).all()

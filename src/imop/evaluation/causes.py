@@ -1,9 +1,9 @@
 """Why an episode failed: what went wrong first, the region, the match, the route, the plan or the physics.
 
-The episode is acted again while the simulator is asked where things are, so only the evaluation may do it.
-Poses are right that carry the demonstrated one over by the true pose of the object or of an equal one, and by turns
-that cannot be seen (`equal_poses`). A pose may be wrong by this measure and do all the same: the first wrong
-action is where to look first, and not always the culprit.
+The episode is acted again while the simulator is asked where things are; only the evaluation may. Right is
+the demonstrated pose, carried over by the true pose of the object or of an equal one, after any turn that
+cannot be seen (`equal_poses`). A pose may be wrong by this measure and do all the same: the first wrong
+action is where to look first, not always the culprit.
 """
 
 from dataclasses import dataclass

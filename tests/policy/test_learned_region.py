@@ -1,0 +1,85 @@
+"""What becomes of the region network's answer. The network is played: what counts is what is made of it."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import torch
+
+from imop.geometry import se3
+from imop.networks.graph import GraphConfig
+from imop.policy.learned_region import find_shown_regions
+from tests.policy.scenes import BLUE, GREY, RED, TABLE, above, at, box, moved, scene, transitions
+
+HOME = above(0.0, -0.3, 1.2)
+NOTE, CHEST = (0.09, 0.06, 0.02), (0.2, 0.2, 0.1)
+TOP = TABLE + 0.1
+
+
+def model(wanted):
+    """A model whose region is where `wanted` (points (N, 3) -> (N,) mask) is True."""
+
+    def region(batch):
+        points = batch.before.points.double().numpy()
+        return [torch.from_numpy(np.where(wanted(points), 5.0, -5.0))]
+
+    return SimpleNamespace(config=SimpleNamespace(graph=GraphConfig()), region=region)
+
+
+def taking():
+    """A note is taken from a chest."""
+    chest, note = box(CHEST, GREY, at(0.1, 0.1)), box(NOTE, RED, at(0.12, 0.1, TOP))
+    grasp, lift = above(0.12, 0.1, TOP + 0.01), above(0.12, 0.1, TOP + 0.2)
+    lifted = moved(note, lift @ se3.invert(grasp))
+    clouds = ((note, HOME, 1.0), (note, grasp, 0.5), (lifted, lift, 0.5))
+    scenes = [scene([chest, thing], T, opening) for thing, T, opening in clouds]
+    return transitions(scenes, [(grasp, False), (lift, False)]), note
+
+
+def everything(points):
+    return points[:, 2] > TABLE + 0.005
+
+
+def test_what_is_taken_is_told_from_the_rest_of_the_region():
+    steps, note = taking()
+    shown = find_shown_regions(model(everything), steps, 0.5)
+    taken = shown[0].taken
+    assert taken is not None and len(taken.cloud) < 0.5 * len(shown[0].region.cloud)
+    np.testing.assert_allclose(taken.cloud.points.mean(axis=0), note.points.mean(axis=0), atol=0.01)
+    assert shown[1].taken is None and shown[1].holding and not shown[0].holding
+
+
+def test_a_region_that_is_what_is_taken_needs_no_telling():
+    steps, note = taking()
+    lower, upper = note.points.min(axis=0) - 0.004, note.points.max(axis=0) + 0.004
+
+    def on_note(points):
+        return np.all((points > lower) & (points < upper), axis=1) & (points[:, 2] > TOP + 0.01)
+
+    assert find_shown_regions(model(on_note), steps, 0.5)[0].taken is None
+
+
+@pytest.mark.parametrize("place", [(0.25, 0.1), (0.1, -0.1)])
+def test_bare_ground_gives_way_to_what_stands_beside(place):
+    chest, cup = box((0.1, 0.1, 0.1), GREY, at(0.1, 0.1)), box((0.04, 0.04, 0.06), BLUE, at(*place))
+    down = above(*place, TABLE + 0.06)
+    held = moved(cup, at(0.0, 0.0, 0.3))
+    scenes = [
+        scene([chest, held], at(0.0, 0.0, 0.3) @ down, 0.5),
+        scene([chest, cup], down),
+    ]
+    steps = transitions(scenes, [(down, True)])
+
+    def ground_there(points):
+        return (np.linalg.norm(points[:, :2] - place, axis=1) < 0.1) & (points[:, 2] < TABLE + 0.002)
+
+    shown = find_shown_regions(model(ground_there), steps, 0.5)[0]
+    assert shown.region.cloud.points[:, 2].min() > TABLE - 0.002
+    height = shown.region.cloud.points[:, 2] - TABLE
+    assert (height > 0.01).mean() > 0.8
+
+
+def test_the_likeliest_few_are_the_region_if_nothing_is_likely():
+    steps, _ = taking()
+    shown = find_shown_regions(model(lambda points: np.zeros(len(points), dtype=bool)), steps, 0.5)[0]
+    assert len(shown.inside) >= 8 and len(shown.region.cloud)
