@@ -83,3 +83,18 @@ def test_the_likeliest_few_are_the_region_if_nothing_is_likely():
     steps, _ = taking()
     shown = find_shown_regions(model(lambda points: np.zeros(len(points), dtype=bool)), steps, 0.5)[0]
     assert len(shown.inside) >= 8 and len(shown.region.cloud)
+
+
+def test_holes_in_a_thing_are_filled_and_other_things_left_alone():
+    chest, cup = box(CHEST, GREY, at(0.1, 0.1)), box((0.04, 0.04, 0.06), BLUE, at(0.4, -0.2))
+    grasp = above(0.1, 0.1, TOP + 0.01)
+    steps = transitions([scene([chest, cup], T) for T in (HOME, grasp)], [(grasp, False)])
+
+    def most_of_the_chest(points):
+        return (points[:, 2] > TABLE + 0.005) & (points[:, 0] < 0.15)
+
+    shown = find_shown_regions(model(most_of_the_chest), steps, 0.5)[0]
+    assert shown.region.cloud.points[:, 0].max() < 0.17
+    assert 0.195 < shown.completed[:, 0].max() < 0.21
+    cloud = steps[0].before.cloud.points
+    assert all((point == cloud).all(axis=1).any() for point in shown.completed[::40])

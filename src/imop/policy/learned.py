@@ -78,7 +78,7 @@ class LearnedStep:
         with torch.inference_mode():
             described = model.matching.backbone(shown.graph)
         prepare = partial(Sought, config, model, step.before, shown, described)
-        region, taken = shown.region, shown.taken
+        region, taken, self._completed = shown.region, shown.taken, shown.completed
         self._sought, self._taken = prepare(region), None
         if taken is not None and len(nodes_at(shown.graph, taken)) >= FEWEST:
             self._taken = prepare(taken)
@@ -95,8 +95,8 @@ class LearnedStep:
 
     @property
     def region(self) -> FloatArray:
-        """(M, 3) points of the region in the demonstrated scene."""
-        return self._sought.region.cloud.points
+        """(M, 3) points of the region in the demonstrated scene, with what is mostly in it completed."""
+        return self._completed
 
     def match(self, query: Scene, hints: Sequence[FloatArray] = ()) -> tuple[Hypothesis, ...]:
         """Where the region is in the query, best first; see `PreparedStep.match`."""
