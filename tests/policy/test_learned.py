@@ -120,3 +120,20 @@ def test_what_has_a_new_colour_is_found_by_its_shape_and_not_in_that_of_another(
         asked = [box(SIZE, new, at(x, y)), box(SIZE, other, at(0.2, -0.1))]
         best = step.match(scene(asked, HOME))[0].T_query_support
         assert se3.translation_distance(best @ GRASP, above(x, y, TABLE + 0.05)) < 0.02
+
+
+def test_what_is_in_the_hand_is_known_in_any_colour(matcher):
+    cube, lift, high = (
+        box(SIZE, RED, at(0.1, 0.1)),
+        above(0.1, 0.1, TABLE + 0.25),
+        above(0.1, 0.1, TABLE + 0.4),
+    )
+
+    def held(color, T):
+        return scene([moved(box(SIZE, color, at(0.1, 0.1)), T @ se3.invert(GRASP))], T, 0.5)
+
+    shown = [scene([cube], HOME), held(RED, GRASP), held(RED, lift), held(RED, high)]
+    steps = transitions(shown, [(GRASP, False), (lift, False), (high, False)])
+    T = at(0.2, -0.1, 0.0, yaw=0.7)
+    best = matcher.prepare(steps)[2].match(held(BLUE, T @ lift))[0]
+    assert se3.translation_distance(best.T_query_support, T) < 0.005 and best.score > 0.5

@@ -86,12 +86,14 @@ class LearnedStep:
             self._rest = Surface(rest, ())
         self._part = region.next_to(step.action.T_world_gripper[:3, 3], NEXT_TO)
         tip = step.before.observation.T_world_gripper[None, :3, 3]
-        self._in_hand = shown.holding and bool(within(tip, self._part.cloud.points, GRASP)[0])
+        touched = len(self._part.cloud) >= SMALLEST and within(tip, self._part.cloud.points, GRASP)[0]
+        self._in_hand = shown.holding and bool(touched)
 
     @cached_property
     def _search_part(self) -> Search:
-        """Few steps need it, and it takes as long to prepare as that of the region."""
-        return Search(self._config.search, self._before, self._part)
+        """Of what is next to the gripper; few steps need it, and it takes long to prepare."""
+        part = self._part.colorless() if self._in_hand else self._part
+        return Search(self._config.search, self._before, part)
 
     @property
     def region(self) -> FloatArray:
@@ -127,7 +129,9 @@ class LearnedStep:
             return whole
         best = np.stack([hypothesis.T_query_support for hypothesis in whole[:KEPT]])
         whole = inquiry.search(np.concatenate([best, sought.anywhere(things)]))
-        return whole if whole[0].score > BENT else self._unbent(matches, inquiry, whole)
+        if whole[0].score > BENT:
+            return whole
+        return self._held(inquiry, whole) if self._in_hand else self._unbent(matches, inquiry, whole)
 
     def _loose(
         self, taken: Sought, seen: Graph, inquiry: Inquiry, whole: tuple[Hypothesis, ...]
@@ -173,34 +177,31 @@ class LearnedStep:
         cloud = self._before.cloud
         return cloud.select(~self._before.ground.bare & ~within(cloud.points, region.cloud.points, SAME))
 
+    def _held(self, inquiry: Inquiry, whole: tuple[Hypothesis, ...]) -> tuple[Hypothesis, ...]:
+        """What is in the hand has moved as the gripper has, whatever its colour."""
+        closer = Inquiry(self._search_part, inquiry.things.colorless())
+        held = closer.repeated()
+        alike = closer.alike(held[0].T_query_support, whole[0].T_query_support)
+        return whole if alike and whole[0].score > held[0].score else held
+
     def _unbent(
         self, matches: Matches, inquiry: Inquiry, whole: tuple[Hypothesis, ...]
     ) -> tuple[Hypothesis, ...]:
-        """Where the part of the region next to the gripper is, if that contradicts where the whole is.
-
-        A part in the hand has moved as the gripper has.
-        """
+        """Where the part of the region next to the gripper is, if that contradicts where the whole is."""
         near = matches.of(self._part.cloud.points)
         if len(near.x) < 3 or len(self._part.cloud) < SMALLEST:
             return whole
         opinion = partial(self._sought.opinion, near)
         T_whole = whole[0].T_query_support
         for_whole = self._sought.opinion(near, T_whole[None], TIGHT)[0]
-        if for_whole >= CONTRADICTED and not self._in_hand:
+        seeds = self._sought.seeds(near, inquiry.things)
+        if for_whole >= CONTRADICTED or not len(seeds):
             return whole
         closer = Inquiry(self._search_part, inquiry.things, inquiry.hints, opinion)
-        if self._in_hand:
-            part = closer.repeated()
-        else:
-            seeds = self._sought.seeds(near, inquiry.things)
-            if not len(seeds):
-                return whole
-            part = closer.search(seeds)
+        part = closer.search(seeds)
         T_part = part[0].T_query_support
         if closer.alike(T_part, T_whole):
             return whole
-        if self._in_hand:
-            return part
         certain = opinion(T_part[None])[0] > CERTAIN
         contradicted = for_whole < CONTRADICTED * self._sought.opinion(near, T_part[None], TIGHT)[0]
         explained = max(AS_GOOD * whole[0].score, closer.finished(T_whole).score + BETTER)

@@ -40,7 +40,12 @@ class Refiner:
             T: (4, 4) first guess.
             stages: largest distance of a pair in each stage, metres.
             iterations: at most, per stage.
+
+        Returns:
+            `T` itself if the region has fewer points than `SMALLEST`.
         """
+        if len(region) < SMALLEST:
+            return T
         source = small_gicp.PointCloud(region)
         for reach in stages:
             result = small_gicp.align(
