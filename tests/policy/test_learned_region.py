@@ -98,3 +98,17 @@ def test_holes_in_a_thing_are_filled_and_other_things_left_alone():
     assert 0.195 < shown.completed[:, 0].max() < 0.21
     cloud = steps[0].before.cloud.points
     assert all((point == cloud).all(axis=1).any() for point in shown.completed[::40])
+
+
+@pytest.mark.parametrize("size", [0.03, 0.1])
+def test_a_scrap_elsewhere_gives_way_to_what_the_gripper_goes_to(size):
+    rack = box((0.1, 0.1, 0.2), GREY, at(0.3, 0.2))
+    scrap = box((size, size, size), BLUE, at(0.0, -0.2), spacing=0.008)
+    place = above(0.3, 0.2, TABLE + 0.22)
+    steps = transitions([scene([rack, scrap], T, 0.0) for T in (HOME, place)], [(place, False)])
+
+    def on_scrap(points):
+        return (points[:, 1] < 0.0) & (points[:, 2] > TABLE + 0.002)
+
+    region = find_shown_regions(model(on_scrap), steps, 0.5)[0].region.cloud.points
+    assert (region[:, 1].min() > 0.0) == (size < 0.05)

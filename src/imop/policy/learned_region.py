@@ -27,6 +27,9 @@ AROUND = 0.1
 # What the hand takes is told from the rest of the region if the region has this share of it, and if it is
 # less than this share of the region.
 KNOWN, MUCH_MORE = 0.5, 0.8
+# A region of fewer points is a scrap. It is not believed if it is farther from where the gripper goes than
+# something else is, by this much, metres.
+SCRAP, FARTHER = 100, 0.05
 # Points nearer to each other than this are of one voxel or of neighbours, metres.
 NEXT = 0.006
 
@@ -78,7 +81,7 @@ def _find(
     threshold: float,
     instead: FloatArray,
 ) -> ShownRegion:
-    """The region of step `k`, or points (M, 3) `instead` if it is nothing but bare ground."""
+    """The region of step `k`, or what is at points (M, 3) `instead` if that cannot be the region."""
     step, config = steps[k], model.config.graph
     before, after = (build_graph(s.cloud, config, s.ground) for s in (step.before, step.after))
     with torch.inference_mode():
@@ -86,14 +89,26 @@ def _find(
     nodes = before.points.double().numpy()
     inside = _likely(probability, threshold)
     standing = ~step.before.ground.bare[nearest(nodes, step.before.cloud.points)[1][:, 0]]
-    if standing[inside].sum() < FEWEST:
-        # The ground is the same everywhere: what stands next to the place says where that is.
-        beside = np.flatnonzero(within(nodes, instead, SAME) & standing)
-        inside = torch.from_numpy(beside) if len(beside) >= FEWEST else inside
-    region = _dense(step, nodes, probability.double().numpy(), inside, contacts.p_gripper_held[k])
+    p_held = contacts.p_gripper_held[k]
+    region = _dense(step, nodes, probability.double().numpy(), inside, p_held)
+    beside = np.flatnonzero(within(nodes, instead, SAME) & standing)
+    # The ground is the same everywhere, and a scrap somewhere else says nothing about this place.
+    nothing = standing[inside].sum() < FEWEST
+    scrap = len(region.cloud) < SCRAP and _away(step, p_held, region.cloud.points) > FARTHER + _away(
+        step, p_held, instead
+    )
+    if len(beside) >= FEWEST and (nothing or scrap):
+        inside = torch.from_numpy(beside)
+        region = _dense(step, nodes, probability.double().numpy(), inside, p_held)
     taken = _taken(step, region, contacts.taken(k, steps))
     points = _completed(step, nodes, probability, region, threshold)
     return ShownRegion(before, probability, inside, region, points, taken, bool(contacts.holding[k]))
+
+
+def _away(step: Transition, p_gripper_held: FloatArray, points: FloatArray) -> float:
+    """Metres from points (M, 3) to where the step takes the tip and what is held."""
+    p_goal = se3.apply(step.action.T_world_gripper, np.concatenate([np.zeros((1, 3)), p_gripper_held]))
+    return float(nearest(p_goal, points)[0].min())
 
 
 def _batch(step: Transition, before: Graph, after: Graph, neighbours: int) -> StepBatch:
