@@ -118,8 +118,10 @@ def test_what_has_a_new_colour_is_found_by_its_shape_and_not_in_that_of_another(
     step = matcher.prepare(transitions([scene(shown, HOME), scene(shown, GRASP, 0.5)], [(GRASP, False)]))[0]
     for x, y in ((0.3, 0.2), (0.0, 0.2)):
         asked = [box(SIZE, new, at(x, y)), box(SIZE, other, at(0.2, -0.1))]
-        best = step.match(scene(asked, HOME))[0].T_query_support
-        assert se3.translation_distance(best @ GRASP, above(x, y, TABLE + 0.05)) < 0.02
+        best = step.match(scene(asked, HOME))[0]
+        assert se3.translation_distance(best.T_query_support @ GRASP, above(x, y, TABLE + 0.05)) < 0.02
+        same = [box(SIZE, color, at(x, y)), asked[1]]
+        assert best.score < step.match(scene(same, HOME))[0].score
 
 
 def test_what_is_in_the_hand_is_known_in_any_colour(matcher):

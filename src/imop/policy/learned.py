@@ -7,7 +7,7 @@ propose motions, and what the cameras saw decides between them and refines the b
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -41,8 +41,9 @@ CERTAIN, CONTRADICTED = 0.8, 0.9
 BETTER, AS_GOOD = 0.1, 0.85
 # What the hand takes is somewhere else than the region says only if it is explained there by this score.
 FOUND = 0.6
-# A region that no motion explains better than this may have another colour.
-LOST = 0.45
+# A region that no motion explains better than this may have another colour. What is found by its shape alone
+# is as sure as this at most.
+LOST, BY_SHAPE = 0.45, 0.8
 # How many of the best motions compete with those to all other things.
 KEPT = 6
 
@@ -169,8 +170,8 @@ class LearnedStep:
         def another(hypothesis: Hypothesis) -> bool:
             return bool(known[nearest(hypothesis.p_query, points)[1][:, 0]].mean() > 0.5)
 
-        good = [hypothesis for hypothesis in shaped if hypothesis.score > BENT]
-        return tuple(sorted(good, key=another))
+        good = [h for h in shaped if h.score > BENT]
+        return tuple(replace(h, score=BY_SHAPE * h.score) for h in sorted(good, key=another))
 
     def _beside(self, region: Region) -> PointCloud:
         """What else than a region stood in the demonstrated scene."""
