@@ -21,7 +21,7 @@ from rich.console import Console
 from rich.table import Table
 
 from imop.errors import ImopError, InvalidInput
-from imop.evaluation.benchmark import parallel
+from imop.evaluation.benchmark import parallel, shown_together
 from imop.evaluation.causes import Cause, Diagnosis, diagnose
 from imop.evaluation.episodes import read_episodes
 from imop.evaluation.picture import save_picture
@@ -80,7 +80,7 @@ def look(trials: list[Trial], method: str, weights: Path | None) -> list[Found]:
 def together(trials: list[Trial]) -> list[list[Trial]]:
     groups: dict[tuple[str, int, int], list[Trial]] = {}
     for trial in trials:
-        groups.setdefault((trial.task, trial.variation, trial.instance), []).append(trial)
+        groups.setdefault(shown_together(trial), []).append(trial)
     return list(groups.values())
 
 

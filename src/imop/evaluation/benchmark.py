@@ -76,7 +76,7 @@ def evaluate_suite(
     ]
     shown = _demonstrations([trial for trial, _ in missing], jobs, console)
     work = [
-        delayed(attempt)(trial, shown[_shared(trial)], method, states[method], weights)
+        delayed(attempt)(trial, shown[shown_together(trial)], method, states[method], weights)
         for trial, method in missing
     ]
     for episode in parallel(work, jobs, console, "episodes"):
@@ -116,7 +116,7 @@ def _count(episodes: list[Episode | None]) -> Count:
     return Count(sum(tried), len(tried))
 
 
-def _shared(trial: Trial) -> tuple[str, int, int]:
+def shown_together(trial: Trial) -> tuple[str, int, int]:
     """What trials with the same demonstration have in common."""
     return trial.task, trial.variation, trial.instance
 
@@ -124,7 +124,7 @@ def _shared(trial: Trial) -> tuple[str, int, int]:
 def _demonstrations(
     trials: list[Trial], jobs: int, console: Console
 ) -> dict[tuple[str, int, int], Demonstration]:
-    wanted = {_shared(trial): trial for trial in trials}
+    wanted = {shown_together(trial): trial for trial in trials}
     work = [delayed(demonstration_for)(trial) for trial in wanted.values()]
     return dict(zip(wanted, parallel(work, jobs, console, "demonstrations"), strict=True))
 
