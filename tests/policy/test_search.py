@@ -25,26 +25,26 @@ def inquiry(poses, hints=(), opinion=None, weight=0.01):
 
 
 def test_a_motion_that_is_nearly_right_is_confirmed_and_mended():
-    found = inquiry([THERE]).confirm((at(0.008, -0.006, 0.0) @ T)[None])
+    found = inquiry([THERE]).confirmed((at(0.008, -0.006, 0.0) @ T)[None])
     error = se3.translation_distance(found[0].T_query_support @ HERE, THERE)
     assert error < 0.003 and found[0].score > 0.9
 
 
 def test_a_motion_to_nowhere_is_not_confirmed():
-    assert inquiry([THERE]).confirm((at(0.0, 0.3, 0.0) @ T)[None]) == ()
+    assert inquiry([THERE]).confirmed((at(0.0, 0.3, 0.0) @ T)[None]) == ()
 
 
 def test_a_motion_is_not_confirmed_if_the_aim_so_far_is_as_good():
     other = at(0.0, 0.2)
     hint = other @ se3.invert(HERE)
-    assert inquiry([THERE, other], [hint]).confirm(T[None]) == ()
-    assert inquiry([THERE, other], [T]).confirm(T[None]) != ()
+    assert inquiry([THERE, other], [hint]).confirmed(T[None]) == ()
+    assert inquiry([THERE, other], [T]).confirmed(T[None]) != ()
 
 
 def test_of_equal_turns_the_demonstrated_one_is_preferred():
     # A box looks the same after half a turn; the gripper has not turned since the demonstration.
     half_turn = at(0.3, -0.2, yaw=np.pi) @ se3.invert(HERE)
-    best = inquiry([at(0.3, -0.2)]).confirm(half_turn[None])[0]
+    best = inquiry([at(0.3, -0.2)]).confirmed(half_turn[None])[0]
     assert se3.rotation_distance(best.T_query_support, np.eye(4)) < 0.05
     assert abs(best.T_query_support[2, 3]) < 0.003
 

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
 
 from imop.errors import InvalidInput
 from imop.geometry import cloud as clouds
@@ -16,6 +17,9 @@ WORKSPACE_UPPER = (0.7, 0.5, 1.6)
 
 # Points nearer than this to the supporting plane belong to it, metres.
 PLANE_THICKNESS = 0.008
+
+# Edge of the cells (metres) that are open ground if nothing in them or beside them leaves the plane by `FLAT`.
+OPEN_CELL, FLAT = 0.0125, 0.004
 
 # A point of the plane whose colour differs by more is a mark on it, unless less than this share is plain.
 MARKED, PLAIN_SHARE = 0.15, 0.8
@@ -68,7 +72,7 @@ class Perception:
             raise InvalidInput("views", "nothing is left in the workspace", accepted)
         cloud = clouds.voxel_downsample(cloud, self.voxel)
         viewpoints = np.stack([view.T_world_camera[:3, 3] for view in observation.views.values()])
-        cloud = clouds.estimate_normals(cloud, viewpoints)
+        cloud = clouds.estimate_normals(cloud, viewpoints, flat=open_ground(cloud.points))
         return cloud.select(clouds.farthest_points(cloud.points, self.max_points))
 
     @staticmethod
@@ -95,20 +99,42 @@ def supporting_plane(cloud: PointCloud, tilt: float = 0.2, bin_height: float = 0
     level = cloud.points[cloud.normals[:, 2] > np.cos(tilt)]
     if len(level) < 50:
         return None
-    slices = np.floor(level[:, 2] / bin_height).astype(np.int64)
-    values, counts = np.unique(slices, return_counts=True)
-    height = (values[np.argmax(counts)] + 0.5) * bin_height
+    height = _most_populated(level[:, 2], bin_height)
     for reach in (2 * bin_height, bin_height):
         near = level[np.abs(level[:, 2] - height) < reach]
-        center = near.mean(axis=0)
-        height = float(center[2])
-    up = np.array([0.0, 0.0, 1.0])
+        height = float(near[:, 2].mean())
+    center, normal = near.mean(axis=0), np.array([0.0, 0.0, 1.0])
     # Two points, or a thin strip, determine no tilt; a table is level.
-    normal = np.linalg.svd(near - center, full_matrices=False)[2][2] if len(near) > 2 else up
-    normal = normal if normal[2] > 0 else -normal
-    if normal[2] < np.cos(tilt):
-        normal = up
+    if len(near) > 2:
+        fitted = clouds.fit_plane(near)[1]
+        fitted = fitted if fitted[2] > 0 else -fitted
+        normal = fitted if fitted[2] >= np.cos(tilt) else normal
     return Plane(normal, float(normal @ center))
+
+
+def _most_populated(z: FloatArray, bin_height: float) -> float:
+    """Middle of the slice that most of the heights (N,) are in, metres."""
+    slices = np.floor(z / bin_height).astype(np.int64)
+    lowest = slices.min()
+    return float((np.argmax(np.bincount(slices - lowest)) + lowest + 0.5) * bin_height)
+
+
+def open_ground(points: FloatArray) -> BoolArray:
+    """(N,) which points (N, 3) lie in the supporting plane, far from all that is not in it.
+
+    Their normals need no search for neighbours, and most of a scene is bare table.
+    """
+    if len(points) < 50:
+        return np.zeros(len(points), dtype=bool)
+    x, y, z = points.T
+    near = points[np.abs(z - _most_populated(z, PLANE_THICKNESS)) < PLANE_THICKNESS]
+    center, normal = clouds.fit_plane(near)
+    flat = np.abs(points @ normal - center @ normal) < FLAT
+    column, row = (((v - v.min()) / OPEN_CELL).astype(np.int64) for v in (x, y))
+    taken = np.zeros((column.max() + 1, row.max() + 1), dtype=bool)
+    taken[column[~flat], row[~flat]] = True
+    beside = ndimage.binary_dilation(taken, np.ones((3, 3)))
+    return np.asarray(flat & ~beside[column, row])
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,9 +166,11 @@ def find_ground(cloud: PointCloud) -> Ground:
     plane, lowest = supporting_plane(cloud), float(cloud.points[:, 2].min())
     if plane is None:
         return Ground(None, np.zeros(len(cloud), dtype=bool), lowest)
-    flat = np.abs(plane.height(cloud.points)) < PLANE_THICKNESS
-    if flat.any():
-        plain = np.abs(cloud.colors - np.median(cloud.colors[flat], axis=0)).max(axis=1) < MARKED
-        if np.mean(plain[flat]) >= PLAIN_SHARE:
-            flat &= plain
-    return Ground(plane, flat, lowest)
+    bare = np.abs(plane.height(cloud.points)) < PLANE_THICKNESS
+    flat = np.flatnonzero(bare)
+    if len(flat):
+        red, green, blue = np.abs(cloud.colors[flat] - np.median(cloud.colors[flat], axis=0)).T
+        plain = np.maximum(np.maximum(red, green), blue) < MARKED
+        if np.mean(plain) >= PLAIN_SHARE:
+            bare[flat] = plain
+    return Ground(plane, bare, lowest)

@@ -1,5 +1,6 @@
 """Weighted least-squares fit of a rigid motion to matched points (the paper's Eq. 2), differentiable."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import roma
@@ -48,24 +49,63 @@ def weighted_procrustes(x: Tensor, y: Tensor, weights: Tensor | None = None) -> 
     _check(x, y, weights)
     w = torch.ones_like(x[..., 0]) if weights is None else weights
     total = w.sum(-1, keepdim=True)
-    w = w / torch.where(total > 0, total, torch.ones_like(total))
-    mean_x, mean_y = (w[..., None] * x).sum(-2), (w[..., None] * y).sum(-2)
-    dx, dy = x - mean_x[..., None, :], y - mean_y[..., None, :]
-    covariance = (w[..., None] * dy).mT @ dx
+    w = w / torch.where(total > 0, total, 1.0)
+    mean_x, mean_y, dx, dy, covariance = _moments(x, y, w)
 
-    rank = torch.where(
-        total[..., 0] > 0, _rank(covariance, w, dx, dy), -torch.ones_like(total[..., 0]).long()
-    )
+    with torch.no_grad():
+        U, singular, Vh = torch.linalg.svd(covariance)
+        rank = torch.where(total[..., 0] > 0, _rank(singular, w, dx, dy), -1)
     unique = (rank >= 2)[..., None, None]
     eye = torch.eye(3, dtype=x.dtype, device=x.device).expand_as(covariance)
-    R = roma.special_procrustes(torch.where(unique, covariance, eye))
+    if covariance.requires_grad:
+        R = roma.special_procrustes(torch.where(unique, covariance, eye))
+    else:
+        R = torch.where(unique, _rotation(U, Vh), eye)
     line = (rank == 1)[..., None, None]
-    R = torch.where(line, _smallest_rotation(torch.where(line, covariance, eye).detach()), R)
-    translation = mean_y - (R @ mean_x[..., None])[..., 0]
+    if line.any():
+        R = torch.where(line, _smallest_rotation(U, Vh), R)
+    return Procrustes(_pose(R, mean_y - R @ mean_x), rank)
 
-    top = torch.cat([R, translation[..., None]], dim=-1)
-    bottom = torch.tensor([0.0, 0.0, 0.0, 1.0], dtype=x.dtype, device=x.device)
-    return Procrustes(torch.cat([top, bottom.expand(*top.shape[:-2], 1, 4)], dim=-2), rank)
+
+@torch.no_grad()
+def robust_procrustes(x: Tensor, y: Tensor, weights: Tensor, reaches: Sequence[float]) -> Tensor:
+    """(..., 4, 4) the motion that most pairs agree on: least squares, weighted anew for every reach.
+
+    A pair that is d from where the motion before carried it counts 1 / (1 + (d / reach)^2)^2 of its weight.
+    No gradient. Where a few hundred pairs are asked for in an instant, what `weighted_procrustes` tells of
+    their rank costs more than the fit.
+
+    Args:
+        x: (..., N, 3), the points that are moved.
+        y: (..., N, 3), where they should go.
+        weights: (..., N), not negative.
+        reaches: in the unit of the points, decreasing.
+    """
+    R = t = None
+    for reach in (None, *reaches):
+        w = weights
+        if reach is not None:
+            off = (x @ R.mT + t.mT - y) / reach
+            w = weights / (1 + off.square().sum(-1)).square()
+        w = w / w.sum(-1, keepdim=True).clamp_min(torch.finfo(w.dtype).tiny)
+        mean_x, mean_y, _, _, covariance = _moments(x, y, w)
+        U, _, Vh = torch.linalg.svd(covariance)
+        R = _rotation(U, Vh)
+        t = mean_y - R @ mean_x
+    return _pose(R, t)
+
+
+def _moments(x: Tensor, y: Tensor, w: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
+    """Means (..., 3, 1) of both sides, offsets from them, and the cross covariance; `w` sums to 1."""
+    mean_x, mean_y = x.mT @ w[..., None], y.mT @ w[..., None]
+    dx, dy = x - mean_x.mT, y - mean_y.mT
+    return mean_x, mean_y, dx, dy, (w[..., None] * dy).mT @ dx
+
+
+def _pose(R: Tensor, t: Tensor) -> Tensor:
+    """(..., 4, 4) of rotations (..., 3, 3) and translations (..., 3, 1)."""
+    bottom = torch.tensor([0.0, 0.0, 0.0, 1.0], dtype=R.dtype, device=R.device)
+    return torch.cat([torch.cat([R, t], dim=-1), bottom.expand(*R.shape[:-2], 1, 4)], dim=-2)
 
 
 def _check(x: Tensor, y: Tensor, weights: Tensor | None) -> None:
@@ -86,31 +126,35 @@ def _check(x: Tensor, y: Tensor, weights: Tensor | None) -> None:
         raise InvalidInput("weights", "negative or not finite", "finite numbers >= 0")
 
 
-@torch.no_grad()
-def _rank(covariance: Tensor, w: Tensor, dx: Tensor, dy: Tensor) -> Tensor:
+def _rotation(U: Tensor, Vh: Tensor) -> Tensor:
+    """(..., 3, 3) the rotation nearest to U diag(s) Vh, for s not increasing."""
+    # The last axis is turned over where the product of the others would be a reflection.
+    last = torch.linalg.det(U @ Vh)[..., None, None] * U[..., :, 2:] @ Vh[..., 2:, :]
+    return U[..., :, :2] @ Vh[..., :2, :] + last
+
+
+def _rank(singular: Tensor, w: Tensor, dx: Tensor, dy: Tensor) -> Tensor:
     """Singular values of the cross covariance that stand above rounding; 0 if the points coincide."""
-    eps = torch.finfo(covariance.dtype).eps
+    eps = torch.finfo(singular.dtype).eps
     spread = [(w * d.square().sum(-1)).sum(-1) for d in (dx, dy)]
     scale = (spread[0] * spread[1]).sqrt()
-    singular = torch.linalg.svdvals(covariance)
     # Coordinates of a metre carry eps of rounding, so points closer than a few hundred eps coincide.
     spread_out = torch.minimum(*spread) > (300 * eps) ** 2
     above = singular > (100 * eps) * scale[..., None]
     return torch.where(spread_out, above.sum(-1), torch.zeros_like(above.sum(-1)))
 
 
-def _smallest_rotation(covariance: Tensor) -> Tensor:
+def _smallest_rotation(U: Tensor, Vh: Tensor) -> Tensor:
     """(..., 3, 3) the rotation of least angle that carries the line of x onto the line of y."""
-    U, _, Vh = torch.linalg.svd(covariance)
     a, b = Vh[..., 0, :], U[..., :, 0]
     axis = torch.linalg.cross(a, b)
     cosine = (a * b).sum(-1, keepdim=True)
     # Opposite directions: half a turn about any axis across the line.
     across = Vh[..., 1, :]
     opposite = cosine < -1 + 1e-6
-    half_turn = 2 * across[..., :, None] * across[..., None, :] - torch.eye(3).to(covariance)
+    half_turn = 2 * across[..., :, None] * across[..., None, :] - torch.eye(3).to(U)
     K = _cross_matrix(axis)
-    turn = torch.eye(3).to(covariance) + K + K @ K / (1 + torch.where(opposite, 0, cosine))[..., None]
+    turn = torch.eye(3).to(U) + K + K @ K / (1 + torch.where(opposite, 0, cosine))[..., None]
     return torch.where(opposite[..., None], half_turn, turn)
 
 

@@ -25,6 +25,11 @@ def invert(T: FloatArray) -> FloatArray:
     return make(R_inverse, p_inverse)
 
 
+def lengths(vectors: FloatArray) -> FloatArray:
+    """(N,) Euclidean norms of vectors (N, 3); on many short rows several times as fast as numpy's norm."""
+    return np.asarray(np.sqrt(np.einsum("nk,nk->n", vectors, vectors)))
+
+
 def apply(T_a_b: FloatArray, p_b: FloatArray) -> FloatArray:
     """Points `p_b` (..., N, 3) of frame b in frame a, for `T_a_b` (..., 4, 4)."""
     moved: FloatArray = p_b @ np.swapaxes(T_a_b[..., :3, :3], -1, -2) + T_a_b[..., None, :3, 3]

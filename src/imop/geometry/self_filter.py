@@ -84,13 +84,15 @@ class SelfFilter:
         points = as_array("points", points, (None, 3))
         data = self._posed(joint_positions, gripper_opening)
         # A point this far away is in no solid.
-        known = np.where(np.isfinite(points).all(axis=1, keepdims=True), points, 1e6)
+        known = points if np.isfinite(points).all() else np.nan_to_num(points, nan=1e6, posinf=1e6, neginf=1e6)
         p_model = se3.apply(se3.invert(self._T_world_model), known)
         robot = np.zeros(len(points), dtype=bool)
-        for solids in self._bodies:
-            centre, radius = _enclosing_sphere(solids, data)
-            offset = p_model - centre
-            near = np.flatnonzero(np.einsum("ij,ij->i", offset, offset) <= radius**2)
+        centres, radii = _enclosing_spheres(self._bodies, data)
+        # |p - c|^2 of all pairs in one product.
+        square = np.einsum("ij,ij->i", p_model, p_model)[:, None] + (centres**2).sum(1) - 2 * p_model @ centres.T
+        reached = square <= radii**2 + 1e-9
+        for number, solids in enumerate(self._bodies):
+            near = np.flatnonzero(reached[:, number])
             for solid in solids:
                 near = near[~robot[near]]
                 p_geom = (p_model[near] - data.geom_xpos[solid.geom]) @ data.geom_xmat[solid.geom].reshape(
@@ -151,8 +153,14 @@ def _solid(model: mujoco.MjModel, geom: int, margin: float) -> _Solid:
     )
 
 
-def _enclosing_sphere(solids: Sequence[_Solid], data: mujoco.MjData) -> tuple[FloatArray, float]:
-    centres = data.geom_xpos[[solid.geom for solid in solids]]
-    centre = centres.mean(axis=0)
-    reach = np.array([solid.reach for solid in solids])
-    return centre, float((np.linalg.norm(centres - centre, axis=1) + reach).max())
+def _enclosing_spheres(
+    bodies: Sequence[Sequence[_Solid]], data: mujoco.MjData
+) -> tuple[FloatArray, FloatArray]:
+    """(B, 3) centres and (B,) radii of spheres around the solids of each body, margins included."""
+    centres, radii = [], []
+    for solids in bodies:
+        places = data.geom_xpos[[solid.geom for solid in solids]]
+        centres.append(places.mean(axis=0))
+        reach = np.array([solid.reach for solid in solids])
+        radii.append((np.linalg.norm(places - centres[-1], axis=1) + reach).max())
+    return np.stack(centres), np.array(radii)

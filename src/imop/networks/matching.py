@@ -12,7 +12,7 @@ from typing import Literal
 import torch
 from torch import Tensor, nn
 
-from imop.geometry.procrustes import weighted_procrustes
+from imop.geometry.procrustes import robust_procrustes
 from imop.networks.backbone import Backbone, BackboneConfig, level_relations
 from imop.networks.blocks import MLP, RELATION, UNIT, DenseBlock, GraphBlock, exact, gather, pad, relation
 from imop.networks.graph import Graph
@@ -71,6 +71,25 @@ class Correspondence:
         return self.layers[-1]
 
 
+@dataclass(frozen=True, eq=False)
+class Described:
+    """A batch of regions, with what the network thinks of them before it sees a query.
+
+    Attributes:
+        x: (B, R, C) padded features after the first round of self attention.
+        p: (B, R, 3) metres, world frame of the demonstration.
+        n: (B, R, 3) unit normals.
+        present: (B, R) True where there is a point.
+        bias: of each layer's self attention, (B, heads, R, R).
+    """
+
+    x: Tensor
+    p: Tensor
+    n: Tensor
+    present: Tensor
+    bias: list[Tensor]
+
+
 class MatchingNetwork(nn.Module):
     """Support state with a region, and a query state -> correspondence matrices."""
 
@@ -97,35 +116,40 @@ class MatchingNetwork(nn.Module):
         self.project = each(nn.Linear, width, width)
         self.log_scale = nn.Parameter(torch.full((config.layers,), 1.0))
 
-    def forward(
-        self, support: Graph, region: Tensor, query: Graph, described: Tensor | None = None
-    ) -> Correspondence:
-        """Match.
+    def describe(self, support: Graph, region: Tensor, features: Tensor | None = None) -> Described:
+        """All about regions that does not depend on the query; it may be kept for many queries.
 
         Args:
             support: s_i, a batch.
             region: (R,) indices of the region's points in `support`, cloud after cloud, at least one in each.
-            query: s_j, as many clouds.
-            described: (M, C) `backbone(support)`, if it was computed before.
+            features: (M, C) `backbone(support)`, if it was computed before.
         """
-        size = support.size
-        cloud = support.cloud[region]
-        features = gather(self.backbone(support) if described is None else described, region)
-        x, region_present = pad(features, cloud, size)
-        p_x, _ = pad(support.points[region], cloud, size)
-        n_x, _ = pad(support.levels[0].normals[region], cloud, size)
+        cloud, size = support.cloud[region], support.size
+        x, present = pad(gather(self.backbone(support) if features is None else features, region), cloud, size)
+        p, _ = pad(support.points[region], cloud, size)
+        n, _ = pad(support.levels[0].normals[region], cloud, size)
+        own = relation(p[:, :, None], n[:, :, None], p[:, None], n[:, None])
+        bias = [_masked(bias(own).permute(0, 3, 1, 2), present) for bias in self.region_bias]
+        return Described(self.region_self[0](x, bias[0]), p, n, present, bias)
+
+    def forward(self, support: Graph, region: Tensor, query: Graph) -> Correspondence:
+        """Match the regions of a batch of support states to as many queries s_j; see `describe`."""
+        return self.match(self.describe(support, region), query)
+
+    def match(self, region: Described, query: Graph) -> Correspondence:
+        """Match regions to a batch of as many queries s_j."""
+        x, size = region.x, query.size
         y = self.backbone(query)
         p_y, query_present = pad(query.points, query.cloud, size)
         n_y, _ = pad(query.levels[0].normals, query.cloud, size)
-        sides = _Sides(p_x, n_x, region_present, p_y, n_y, query_present)
-        own = relation(p_x[:, :, None], n_x[:, :, None], p_x[:, None], n_x[:, None])
+        sides = _Sides(region.p, region.n, region.present, p_y, n_y, query_present)
         r_query = level_relations(query.levels[0])
 
         matrices: list[Tensor] = []
         T: Tensor | None = None
         for k in range(self.config.layers):
-            bias = self.region_bias[k](own).permute(0, 3, 1, 2)
-            x = self.region_self[k](x, _masked(bias, region_present))
+            if k:
+                x = self.region_self[k](x, region.bias[k])
             y = self.query_self[k](y, query.levels[0].neighbours, r_query)
             y_padded, _ = pad(y, query.cloud, size)
             cross = self._dense if self.config.attention == "global" else self._graph
@@ -134,7 +158,7 @@ class MatchingNetwork(nn.Module):
             matrices.append(self._match(k, x, y_padded, sides))
             if k + 1 < self.config.layers:
                 T = reposition(matrices[-1], sides.p_x, sides.p_y)
-        return Correspondence(matrices, p_x, p_y, region_present, query_present)
+        return Correspondence(matrices, region.p, p_y, region.present, query_present)
 
     def _match(self, k: int, x: Tensor, y: Tensor, sides: "_Sides") -> Tensor:
         a, b = self.project[k](x).float(), self.project[k](y).float()
@@ -150,8 +174,10 @@ class MatchingNetwork(nn.Module):
             to_x = sides.x[:, None].expand(-1, y.shape[1], -1)
         else:
             distance = torch.cdist(_moved(T, sides.p_x), sides.p_y) / UNIT
-            near = torch.stack([distance.log1p(), torch.exp(-distance), torch.exp(-distance / 4)], dim=-1)
-            bias = self.near_bias[k - 1](near).permute(0, 3, 1, 2)
+            near = torch.stack([distance.log1p(), torch.exp(-distance), torch.exp(-distance / 4)], dim=1)
+            # A linear layer over dimension 1: the attention wants its heads there.
+            weights = self.near_bias[k - 1]
+            bias = (weights.weight @ near.flatten(2) + weights.bias[:, None]).unflatten(2, distance.shape[1:])
             to_y, to_x = _masked(bias, sides.y), _masked(bias.mT, sides.x)
         return self.region_cross[k](x, to_y, y), self.query_cross[k](y, to_x, x)
 
@@ -217,12 +243,7 @@ def reposition(matrix: Tensor, p_x: Tensor, p_y: Tensor) -> Tensor:
         weight, best = matrix.to(p_x.dtype).topk(min(LIKELIEST, matrix.shape[2]), dim=2)
         y = torch.gather(p_y, 1, best.flatten(1)[..., None].expand(-1, -1, 3))
         x = p_x.repeat_interleave(weight.shape[2], dim=1)
-        weight = weight.flatten(1)
-        T = weighted_procrustes(x, y, weight).T_y_x
-        for reach in REACHES:
-            agreeing = weight / (1 + ((_moved(T, x) - y) / reach).square().sum(-1)).square()
-            T = weighted_procrustes(x, y, agreeing).T_y_x
-        return T
+        return robust_procrustes(x, y, weight.flatten(1), REACHES)
 
 
 def _moved(T: Tensor, p: Tensor) -> Tensor:
@@ -232,7 +253,7 @@ def _moved(T: Tensor, p: Tensor) -> Tensor:
 
 def _masked(bias: Tensor, present: Tensor) -> Tensor:
     """(B, H, M, N) bias with absent columns (B, N) shut out."""
-    return bias.masked_fill(~present[:, None, None], -1e9)
+    return bias if present.all() else bias.masked_fill(~present[:, None, None], -1e9)
 
 
 def _nearest(distance: Tensor, k: int) -> Tensor:

@@ -77,8 +77,8 @@ class LearnedStep:
     def __init__(self, model: Model, config: SoughtConfig, step: Transition, shown: ShownRegion) -> None:
         self._model, self._config, self._before = model, config, step.before
         with torch.inference_mode():
-            described = model.matching.backbone(shown.graph)
-        prepare = partial(Sought, config, model, step.before, shown, described)
+            features = model.matching.backbone(shown.graph)
+        prepare = partial(Sought, config, model, step.before, shown, features)
         region, taken, self._completed = shown.region, shown.taken, shown.completed
         self._sought, self._taken = prepare(region), None
         if taken is not None and len(nodes_at(shown.graph, taken)) >= FEWEST:
@@ -108,8 +108,21 @@ class LearnedStep:
         standing = without_held(query.cloud.select(~query.ground.bare), query, self._sought.region)
         if len(standing) < 5:
             return ()
-        seen = build_graph(query.cloud, self._model.config.graph, query.ground)
         things = Things(query, standing)
+        return self._followed(things, hints) or self._searched(things, hints)
+
+    def _followed(self, things: Things, hints: Sequence[FloatArray]) -> tuple[Hypothesis, ...]:
+        """Where the region is if it has moved as what was acted on before; no network need be asked."""
+        found = Inquiry(self._sought.search, things, hints).followed()
+        if found and self._taken is not None:
+            taken = self._there(self._taken, things, found[0].T_query_support)
+            return found if taken.score > BENT else ()
+        return found
+
+    def _searched(self, things: Things, hints: Sequence[FloatArray]) -> tuple[Hypothesis, ...]:
+        """Where the networks and what was seen say that the region is."""
+        query = things.query
+        seen = build_graph(query.cloud, self._model.config.graph, query.ground)
         matches, fit = self._sought.matched(seen)
         inquiry = Inquiry(self._sought.search, things, hints, partial(self._sought.opinion, matches))
         whole = self._whole(matches, fit, inquiry)
@@ -121,9 +134,7 @@ class LearnedStep:
     def _whole(self, matches: Matches, fit: FloatArray, inquiry: Inquiry) -> tuple[Hypothesis, ...]:
         """Where the whole region is, or the part of it that is next to the gripper."""
         sought, things = self._sought, inquiry.things
-        trusted = sought.trusted(matches, fit, inquiry.hints)
-        confirmed = inquiry.confirm(np.stack(trusted)) if trusted else ()
-        if confirmed:
+        if confirmed := inquiry.confirmed(sought.trusted(matches, fit)):
             return confirmed
         whole = inquiry.search(np.concatenate([fit, sought.seeds(matches, things)]))
         if whole[0].score > BENT:
@@ -134,6 +145,11 @@ class LearnedStep:
             return whole
         return self._held(inquiry, whole) if self._in_hand else self._unbent(matches, inquiry, whole)
 
+    @staticmethod
+    def _there(taken: Sought, things: Things, T_whole: FloatArray) -> Hypothesis:
+        """What the hand takes, where the region says that it is."""
+        return Inquiry(taken.search, things).finished(T_whole)
+
     def _loose(
         self, taken: Sought, seen: Graph, inquiry: Inquiry, whole: tuple[Hypothesis, ...]
     ) -> tuple[Hypothesis, ...]:
@@ -142,7 +158,7 @@ class LearnedStep:
         Notes on a safe may lie anywhere on it. They are looked for in what the rest of the region leaves.
         """
         T_whole, things = whole[0].T_query_support, inquiry.things
-        there = Inquiry(taken.search, things).finished(T_whole)
+        there = self._there(taken, things, T_whole)
         left = things.unexplained(self._rest, T_whole)
         if there.score > BENT or left is None:
             return whole

@@ -32,6 +32,8 @@ OTHERWISE = 1.0
 TURNED = 0.35
 # A likely motion that explains this share of what a trusted one does has to be compared with it.
 RIVAL = 0.85
+# Before closest points have mended it, a motion is worth a try that explains this share of what the best does.
+TURNABLE = 0.5
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,7 @@ class SearchConfig:
         tilt: share that it loses for tilting things by `TILTED` or more; twice for turning them over.
         change: share that it loses for another pose than the demonstrated motion leads to, once begun.
         sure: score from which a trusted motion needs no search.
+        followed: the same of a motion that was right in the step before.
         opinion: what full support by the matcher's opinion adds to the score when motions are compared.
     """
 
@@ -60,6 +63,7 @@ class SearchConfig:
     tilt: float = 0.35
     change: float = 0.12
     sure: float = 0.7
+    followed: float = 0.6
     opinion: float = 0.1
 
 
@@ -121,30 +125,43 @@ class Inquiry:
         self._likely = np.stack([*hints, np.eye(4), self._T_repeated])
         self._begun, self._opinion = bool(hints), opinion
 
-    def confirm(self, trusted: FloatArray) -> tuple[Hypothesis, ...]:
-        """The motions next to the best of trusted ones (H, 4, 4); none if it does not explain the scene.
+    def followed(self) -> tuple[Hypothesis, ...]:
+        """The motions next to the best hint; none if there is none, or none explains the scene."""
+        likely = self._unrivalled(np.stack(self.hints)) if self._begun else ()
+        if not likely:
+            return ()
+        T = self.things.refine(self._search.fine, self._moved(likely[0]), FINEST)
+        ordered = self._ordered(self._judged([T, upright(T, self._center)]))
+        return ordered if ordered[0].score >= self._config.followed else ()
 
-        Nor if another likely motion explains it about as well, for then all of them have to be compared.
+    def confirmed(self, trusted: FloatArray) -> tuple[Hypothesis, ...]:
+        """The motions next to the best of trusted ones (H, 4, 4); none if it does not explain the scene."""
+        likely = self._unrivalled(trusted) if len(trusted) else ()
+        if not likely:
+            return ()
+        best, straight = likely
+        T = self._moved(best)
+        if self._judge.glance(T[None])[0] < 0.5 * self._config.sure:
+            return ()
+        others = [self._as_repeated(T), straight, *([self._half_turn(T)] * bool(self._config.turned))]
+        found = [T, *(self._moved(other) for other in self._promising(others, TURNABLE))]
+        found = self._judged(self._promising([*found, *(upright(T, self._center) for T in found)], RIVAL))
+        found.append(self.finished(self._ordered(found)[0].T_query_support))
+        ordered = self._ordered(found)
+        return ordered if ordered[0].score >= self._config.sure else ()
+
+    def _unrivalled(self, trusted: FloatArray) -> tuple[FloatArray, ...]:
+        """The best of trusted motions (H, 4, 4), and the straightest that is about as good and there, too.
+
+        Nothing if another likely motion explains the scene about as well, for then all have to be compared.
         """
         motions = np.concatenate([trusted, self._likely])
         glances = self._judge.glance(motions)
         best = int(np.argmax(glances[: len(trusted)]))
-        T, alike = motions[best], np.flatnonzero(glances >= RIVAL * glances[best])
-        if not np.all(self._near(motions[alike], T)):
+        alike = motions[glances >= RIVAL * glances[best]]
+        if not np.all(self._near(alike, motions[best])):
             return ()
-        found = [self._refined(T)]
-        if found[0].score < 0.5 * self._config.sure:
-            return ()
-        T = found[0].T_query_support
-        straight = alike[np.argmin(se3.rotation_distance(motions[alike], self._T_repeated))]
-        other = self._as_repeated(T) if straight == best else motions[straight]
-        found += [self._refined(other), self._upright(T)]
-        if self._config.turned:
-            turned = self._refined(self._half_turn(T))
-            found += [turned, self._upright(turned.T_query_support)]
-        found.append(self.finished(self._ordered(found)[0].T_query_support))
-        ordered = self._ordered(found)
-        return ordered if ordered[0].score >= self._config.sure else ()
+        return motions[best], alike[np.argmin(se3.rotation_distance(alike, self._T_repeated))]
 
     def search(self, seeds: FloatArray) -> tuple[Hypothesis, ...]:
         """Where the region is in the query, best first.
@@ -183,6 +200,11 @@ class Inquiry:
             self._judge.judge(ranked[i])
             for i in distinct(ranked, self._center, self._config.judged, *SAME_MOTION)
         ]
+
+    def _promising(self, motions: list[FloatArray], share: float) -> list[FloatArray]:
+        """Those of motions that explain, at a glance, at least so much of what the best of them does."""
+        glances = self._judge.glance(np.stack(motions))
+        return [T for T, glance in zip(motions, glances, strict=True) if glance >= share * glances.max()]
 
     def _moved(self, T: FloatArray, part: int = -1) -> FloatArray:
         return self.things.refine(self._search.coarse[part], T)

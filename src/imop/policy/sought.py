@@ -1,6 +1,7 @@
 """One region of a demonstrated step, as the matching network and the search look for it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -37,6 +38,7 @@ class SoughtConfig:
         samples: triples drawn from the matches.
         places: things of the query on which the region is set upright, too.
         turns: how often, over a full turn.
+        threads: of the matching network; the small one loses more by waiting for a second than that does.
         search: how the motions are refined and judged.
         seed: of the sampling.
     """
@@ -46,6 +48,7 @@ class SoughtConfig:
     samples: int = 4000
     places: int = 2
     turns: int = 24
+    threads: int = 1
     search: SearchConfig = field(
         default_factory=lambda: SearchConfig(finished=2, righted=3, turned=4, turn=0.05, sure=0.72)
     )
@@ -60,7 +63,7 @@ class Sought:
         model: with the matching network.
         before: the demonstrated scene.
         shown: its graph and its region.
-        described: of the graph, by the matching network's backbone.
+        features: of the graph, by the matching network's backbone.
         region: what is looked for; `shown.region` or a part of it.
 
     Attributes:
@@ -74,14 +77,16 @@ class Sought:
         model: Model,
         before: Scene,
         shown: ShownRegion,
-        described: Tensor,
+        features: Tensor,
         region: Region,
     ) -> None:
         self._config, self._model, self._before = config, model, before
-        self._graph, self._described, self.region = shown.graph, described, region
+        self._graph, self.region = shown.graph, region
         inside = shown.inside if region is shown.region else nodes_at(shown.graph, region)
         few = farthest_points(shown.graph.points[inside].double().numpy(), model.config.matching.max_region)
         self._chosen = inside[torch.from_numpy(few).sort().values]
+        with torch.inference_mode():
+            self._described = model.matching.describe(shown.graph, self._chosen, features)
         self._probability = shown.probability[self._chosen].double().numpy()
         self._loose = region is not shown.region
         self.search = Search(config.search, before, region, self._loose)
@@ -97,18 +102,17 @@ class Sought:
 
     def matched(self, seen: Graph) -> tuple[Matches, FloatArray]:
         """The network's matches in a query, and the motions (H, 4, 4) that most of them agree on."""
-        with torch.inference_mode():
-            found = self._model.matching(self._graph, self._chosen, seen, self._described)
+        with torch.inference_mode(), threads(self._config.threads):
+            found = self._model.matching.match(self._described, seen)
+            fit = reposition(found.last, found.p_region, found.p_query)
         C, candidates = found.last[0], self._config.candidates
         matches = likeliest(C, self._graph, self._chosen, seen, self._probability, candidates)
-        return matches, reposition(found.last, found.p_region, found.p_query).double().numpy()
+        return matches, fit.double().numpy()
 
-    def trusted(self, m: Matches, fit: FloatArray, hints: Sequence[FloatArray]) -> list[FloatArray]:
-        """Motions worth a look before a search; none if many turns are equal, for then a few compete."""
-        if len(self._turns) > 1:
-            return []
+    def trusted(self, m: Matches, fit: FloatArray) -> FloatArray:
+        """(H, 4, 4) motions worth a look before a search: what most matches agree on, in any equal turn."""
         agreed = m.agreement(fit)[0] > self._config.trusted
-        return [*hints, *fit] if agreed else list(hints)
+        return fit @ self._turns if agreed else np.zeros((0, 4, 4))
 
     def opinion(self, m: Matches, T: FloatArray, tolerance: float = LOOSE) -> FloatArray:
         """(H,) share of the matches that speak for motions (H, 4, 4), in any of the turns of equal shape.
@@ -130,6 +134,17 @@ class Sought:
         """(H, 4, 4) motions, in every turn, to every thing there is: the matches may be of a wrong one."""
         places, turns = things.places(ENOUGH), self._config.turns
         return np.concatenate([upright_motions(center, places, turns) for center in self._middles])
+
+
+@contextmanager
+def threads(count: int) -> Iterator[None]:
+    """Torch with so many threads, for a while."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(count)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
 
 
 def nodes_at(graph: Graph, region: Region) -> Tensor:
