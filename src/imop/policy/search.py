@@ -32,6 +32,8 @@ OTHERWISE = 1.0
 TURNED = 0.35
 # A likely motion that explains this share of what a trusted one does has to be compared with it.
 RIVAL = 0.85
+# A thing that has moved as before is explained at a glance by this share of what it is in the end.
+STILL = 0.75
 # Before closest points have mended it, a motion is worth a try that explains this share of what the best does.
 TURNABLE = 0.5
 
@@ -128,10 +130,10 @@ class Inquiry:
     def followed(self) -> tuple[Hypothesis, ...]:
         """The motions next to the best hint; none if there is none, or none explains the scene."""
         likely = self._unrivalled(np.stack(self.hints)) if self._begun else ()
-        if not likely:
+        if not likely or self._judge.glance(likely[0][None])[0] < STILL * self._config.followed:
             return ()
         T = self.things.refine(self._search.fine, self._moved(likely[0]), FINEST)
-        ordered = self._ordered(self._judged([T, upright(T, self._center)]))
+        ordered = self._ordered(self._judged([T, upright(T, self._center), likely[1]]))
         return ordered if ordered[0].score >= self._config.followed else ()
 
     def confirmed(self, trusted: FloatArray) -> tuple[Hypothesis, ...]:

@@ -110,9 +110,12 @@ class Sought:
         return matches, fit.double().numpy()
 
     def trusted(self, m: Matches, fit: FloatArray) -> FloatArray:
-        """(H, 4, 4) motions worth a look before a search: what most matches agree on, in any equal turn."""
-        agreed = m.agreement(fit)[0] > self._config.trusted
-        return fit @ self._turns if agreed else np.zeros((0, 4, 4))
+        """(H, 4, 4) motions worth a look before a search: what most matches agree on.
+
+        None if many turns are equal: which of them is the best has to be searched.
+        """
+        agreed = len(self._turns) == 1 and m.agreement(fit)[0] > self._config.trusted
+        return fit if agreed else np.zeros((0, 4, 4))
 
     def opinion(self, m: Matches, T: FloatArray, tolerance: float = LOOSE) -> FloatArray:
         """(H,) share of the matches that speak for motions (H, 4, 4), in any of the turns of equal shape.
