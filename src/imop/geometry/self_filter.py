@@ -88,11 +88,11 @@ class SelfFilter:
         p_model = se3.apply(se3.invert(self._T_world_model), known)
         robot = np.zeros(len(points), dtype=bool)
         centres, radii = _enclosing_spheres(self._bodies, data)
-        # |p - c|^2 of all pairs in one product.
-        square = np.einsum("ij,ij->i", p_model, p_model)[:, None] + (centres**2).sum(1) - 2 * p_model @ centres.T
-        reached = square <= radii**2 + 1e-9
-        for number, solids in enumerate(self._bodies):
-            near = np.flatnonzero(reached[:, number])
+        # |p - c|^2 <= r^2 of all pairs in one product.
+        beyond = np.einsum("ij,ij->i", p_model, p_model) - 2 * centres @ p_model.T
+        reached = beyond <= (radii**2 - (centres**2).sum(axis=1) + 1e-9)[:, None]
+        for solids, inside in zip(self._bodies, reached, strict=True):
+            near = np.flatnonzero(inside)
             for solid in solids:
                 near = near[~robot[near]]
                 p_geom = (p_model[near] - data.geom_xpos[solid.geom]) @ data.geom_xmat[solid.geom].reshape(
