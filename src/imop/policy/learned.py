@@ -108,12 +108,18 @@ class LearnedStep:
         standing = without_held(query.cloud.select(~query.ground.bare), query, self._sought.region)
         if len(standing) < 5:
             return ()
-        things = Things(query, standing)
-        return self._followed(things, hints) or self._searched(things, hints)
+        return self._followed(query, standing, hints) or self._searched(Things(query, standing), hints)
 
-    def _followed(self, things: Things, hints: Sequence[FloatArray]) -> tuple[Hypothesis, ...]:
+    def _followed(
+        self, query: Scene, standing: PointCloud, hints: Sequence[FloatArray]
+    ) -> tuple[Hypothesis, ...]:
         """Where the region is if it has moved as what was acted on before; no network need be asked."""
-        found = Inquiry(self._sought.search, things, hints).followed()
+        search = self._sought.search
+        near = standing.select(search.around(standing.points, search.likely(query, hints)))
+        if not hints or len(near) < SMALLEST:
+            return ()
+        things = Things(query, near)
+        found = Inquiry(search, things, hints).followed()
         if found and self._taken is not None:
             taken = self._there(self._taken, things, found[0].T_query_support)
             return found if taken.score > BENT else ()

@@ -12,7 +12,7 @@ from imop.policy.evidence import Judge, Template
 from imop.policy.hypotheses import distinct
 from imop.policy.matcher import Hypothesis, Scene
 from imop.policy.objects import connected
-from imop.policy.refine import FINEST, upright
+from imop.policy.refine import CLOSE, FINEST, upright
 from imop.policy.region import Region
 from imop.policy.symmetry import half_turn
 from imop.policy.things import Things, middle
@@ -34,6 +34,8 @@ TURNED = 0.35
 RIVAL = 0.85
 # A thing that has moved as before is explained at a glance by this share of what it is in the end.
 STILL = 0.75
+# What is farther than this (metres) from where a region may be has nothing to say about it.
+BESIDE = 0.08
 # Before closest points have mended it, a motion is worth a try that explains this share of what the best does.
 TURNABLE = 0.5
 
@@ -91,6 +93,26 @@ class Search:
         self.fine = region.cloud.points[farthest_points(region.cloud.points, 1500)]
         self.half_turn = half_turn(region.cloud.points if loose else self._thing(before))
 
+    def likely(self, query: Scene, hints: Sequence[FloatArray]) -> FloatArray:
+        """(H, 4, 4) motions to look at in any case: hints, none at all, and what the gripper has done."""
+        return np.stack([*hints, np.eye(4), self.repeated(query)])
+
+    def repeated(self, query: Scene) -> FloatArray:
+        """(4, 4) the motion of the gripper since the demonstration."""
+        return query.observation.T_world_gripper @ se3.invert(self.T_world_gripper)
+
+    def around(self, points: FloatArray, motions: FloatArray) -> BoolArray:
+        """(N,) which points (N, 3) have to do with the region after any of the motions (H, 4, 4)."""
+        whole = self.region.whole.points
+        corners = np.stack(np.meshgrid(*np.stack([whole.min(axis=0), whole.max(axis=0)]).T), axis=-1)
+        reached = np.zeros(len(points), dtype=bool)
+        for box in se3.apply(motions, corners.reshape(-1, 3)):
+            inside = np.ones(len(points), dtype=bool)
+            for column, low, high in zip(points.T, box.min(axis=0), box.max(axis=0), strict=True):
+                inside &= (column > low - BESIDE) & (column < high + BESIDE)
+            reached |= inside
+        return reached
+
     def _thing(self, before: Scene) -> FloatArray:
         """(N, 3) the thing in the demonstrated scene that the region is part of."""
         points = before.cloud.points[~before.ground.bare]
@@ -122,9 +144,8 @@ class Inquiry:
         self._search, self._config, self._center = search, search.config, search.center
         self._judge = Judge(search.template, things.surface)
         self.things, self.hints = things, hints
-        T_world_gripper = things.query.observation.T_world_gripper
-        self._T_repeated = T_world_gripper @ se3.invert(search.T_world_gripper)
-        self._likely = np.stack([*hints, np.eye(4), self._T_repeated])
+        self._T_repeated = search.repeated(things.query)
+        self._likely = search.likely(things.query, hints)
         self._begun, self._opinion = bool(hints), opinion
 
     def followed(self) -> tuple[Hypothesis, ...]:
@@ -132,7 +153,8 @@ class Inquiry:
         likely = self._unrivalled(np.stack(self.hints)) if self._begun else ()
         if not likely or self._judge.glance(likely[0][None])[0] < STILL * self._config.followed:
             return ()
-        T = self.things.refine(self._search.fine, self._moved(likely[0]), FINEST)
+        T = self.things.refine(self._search.coarse[-1], likely[0], CLOSE)
+        T = self.things.refine(self._search.fine, T, FINEST)
         ordered = self._ordered(self._judged([T, upright(T, self._center), likely[1]]))
         return ordered if ordered[0].score >= self._config.followed else ()
 
