@@ -57,8 +57,10 @@ def unproject(view: CameraView) -> FloatArray:
     height, width = view.depth.shape
     u, v = np.meshgrid(np.arange(width), np.arange(height))
     depth = np.where(view.measured, view.depth, 0.0).astype(np.float64)
-    rays = np.stack([u, v, np.ones_like(u)], axis=-1) @ np.linalg.inv(view.intrinsics).T
-    return se3.apply(view.T_world_camera, (rays * depth[..., None]).reshape(-1, 3)).reshape(height, width, 3)
+    T = view.T_world_camera
+    rays = np.stack([u, v, np.ones_like(u)], axis=-1) @ (T[:3, :3] @ np.linalg.inv(view.intrinsics)).T
+    points: FloatArray = rays * depth[..., None] + T[:3, 3]
+    return points
 
 
 def project(view: CameraView, p_world: FloatArray) -> tuple[NDArray[np.int64], FloatArray, BoolArray]:

@@ -105,10 +105,8 @@ class LearnedStep:
         """Where the region is in the query, best first; see `PreparedStep.match`."""
         if len(query.cloud) < 5:
             return ()
-        standing = without_held(query.cloud.select(~query.ground.bare), query, self._sought.region)
-        if len(standing) < 5:
-            return ()
-        return self._followed(query, standing, hints) or self._searched(Things(query, standing), hints)
+        standing = query.cloud.select(~query.ground.bare)
+        return self._followed(query, standing, hints) or self._searched(query, standing, hints)
 
     def _followed(
         self, query: Scene, standing: PointCloud, hints: Sequence[FloatArray]
@@ -116,6 +114,7 @@ class LearnedStep:
         """Where the region is if it has moved as what was acted on before; no network need be asked."""
         search = self._sought.search
         near = standing.select(search.around(standing.points, search.likely(query, hints)))
+        near = without_held(near, query, self._sought.region)
         if not hints or len(near) < SMALLEST:
             return ()
         things = Things(query, near)
@@ -125,9 +124,14 @@ class LearnedStep:
             return found if taken.score > BENT else ()
         return found
 
-    def _searched(self, things: Things, hints: Sequence[FloatArray]) -> tuple[Hypothesis, ...]:
+    def _searched(
+        self, query: Scene, standing: PointCloud, hints: Sequence[FloatArray]
+    ) -> tuple[Hypothesis, ...]:
         """Where the networks and what was seen say that the region is."""
-        query = things.query
+        standing = without_held(standing, query, self._sought.region)
+        if len(standing) < SMALLEST:
+            return ()
+        things = Things(query, standing)
         seen = build_graph(query.cloud, self._model.config.graph, query.ground)
         matches, fit = self._sought.matched(seen)
         inquiry = Inquiry(self._sought.search, things, hints, partial(self._sought.opinion, matches))

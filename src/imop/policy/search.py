@@ -150,12 +150,15 @@ class Inquiry:
 
     def followed(self) -> tuple[Hypothesis, ...]:
         """The motions next to the best hint; none if there is none, or none explains the scene."""
-        likely = self._unrivalled(np.stack(self.hints)) if self._begun else ()
-        if not likely or self._judge.glance(likely[0][None])[0] < STILL * self._config.followed:
+        likely = self._unrivalled(np.stack(self.hints), STILL * self._config.followed) if self._begun else ()
+        if not likely:
             return ()
-        T = self.things.refine(self._search.coarse[-1], likely[0], CLOSE)
+        hint, straight = likely
+        T = self.things.refine(self._search.coarse[-1], hint, CLOSE)
         T = self.things.refine(self._search.fine, T, FINEST)
-        ordered = self._ordered(self._judged([T, upright(T, self._center), likely[1]]))
+        near = np.stack([T, upright(T, self._center), straight])
+        different = near[distinct(near, self._center, len(near), *SAME_MOTION)]
+        ordered = self._ordered([self._judge.judge(T) for T in different])
         return ordered if ordered[0].score >= self._config.followed else ()
 
     def confirmed(self, trusted: FloatArray) -> tuple[Hypothesis, ...]:
@@ -174,16 +177,17 @@ class Inquiry:
         ordered = self._ordered(found)
         return ordered if ordered[0].score >= self._config.sure else ()
 
-    def _unrivalled(self, trusted: FloatArray) -> tuple[FloatArray, ...]:
+    def _unrivalled(self, trusted: FloatArray, least: float = 0.0) -> tuple[FloatArray, ...]:
         """The best of trusted motions (H, 4, 4), and the straightest that is about as good and there, too.
 
-        Nothing if another likely motion explains the scene about as well, for then all have to be compared.
+        Nothing if the best explains less than `least` of the region at a glance, or if another likely motion
+        explains the scene about as well, for then all have to be compared.
         """
         motions = np.concatenate([trusted, self._likely])
         glances = self._judge.glance(motions)
         best = int(np.argmax(glances[: len(trusted)]))
         alike = motions[glances >= RIVAL * glances[best]]
-        if not np.all(self._near(alike, motions[best])):
+        if glances[best] < least or not np.all(self._near(alike, motions[best])):
             return ()
         return motions[best], alike[np.argmin(se3.rotation_distance(alike, self._T_repeated))]
 
