@@ -39,12 +39,14 @@ class PointCloud:
 
     def select(self, which: NDArray[np.bool_] | NDArray[np.integer]) -> "PointCloud":
         """The points picked by a mask (N,) or by indices."""
+        # Rows are taken by index twice as fast as by a mask, which would be searched for every attribute.
+        rows = np.flatnonzero(which) if which.dtype == bool else which
         return PointCloud(
-            self.points[which],
-            self.colors[which],
-            self.camera[which],
-            None if self.normals is None else self.normals[which],
-            None if self.ids is None else self.ids[which],
+            self.points.take(rows, axis=0),
+            self.colors.take(rows, axis=0),
+            self.camera[rows],
+            None if self.normals is None else self.normals.take(rows, axis=0),
+            None if self.ids is None else self.ids[rows],
         )
 
     def colorless(self) -> "PointCloud":
@@ -110,14 +112,11 @@ def fuse(observation: Observation) -> PointCloud:
     parts = []
     with_ids = all(view.instance_ids is not None for view in observation.views.values())
     for number, view in enumerate(observation.views.values()):
-        keep = view.measured & ~flying_pixels(view)
-        ids = view.instance_ids[keep] if with_ids and view.instance_ids is not None else None
-        camera = np.full(keep.sum(), number, dtype=np.int32)
-        parts.append(
-            PointCloud(
-                unproject(view)[keep], view.rgb[keep].astype(np.float32) / np.float32(255), camera, None, ids
-            )
-        )
+        keep = np.flatnonzero(view.measured & ~flying_pixels(view))
+        points, colors = (pixels.reshape(-1, 3).take(keep, axis=0) for pixels in (unproject(view), view.rgb))
+        ids = view.instance_ids.ravel()[keep] if with_ids and view.instance_ids is not None else None
+        camera = np.full(len(keep), number, dtype=np.int32)
+        parts.append(PointCloud(points, colors.astype(np.float32) / np.float32(255), camera, None, ids))
     cloud = concatenate(parts)
     if not len(cloud):
         raise InvalidInput(

@@ -149,8 +149,14 @@ class Inquiry:
         self._begun, self._opinion = bool(hints), opinion
 
     def followed(self) -> tuple[Hypothesis, ...]:
-        """The motions next to the best hint; none if there is none, or none explains the scene."""
-        likely = self._unrivalled(np.stack(self.hints), STILL * self._config.followed) if self._begun else ()
+        """The motions next to the best hint, or to what the gripper has done since the demonstration.
+
+        None if the episode only begins, or if none of them explains the scene.
+        """
+        if not self._begun:
+            return ()
+        trusted = np.stack([*self.hints, self._T_repeated])
+        likely = self._unrivalled(trusted, STILL * self._config.followed)
         if not likely:
             return ()
         hint, straight = likely
