@@ -113,7 +113,8 @@ def fuse(observation: Observation) -> PointCloud:
     with_ids = all(view.instance_ids is not None for view in observation.views.values())
     for number, view in enumerate(observation.views.values()):
         keep = np.flatnonzero(view.measured & ~flying_pixels(view))
-        points, colors = (pixels.reshape(-1, 3).take(keep, axis=0) for pixels in (unproject(view), view.rgb))
+        points = unproject(view).reshape(-1, 3).take(keep, axis=0)
+        colors = view.rgb.reshape(-1, 3).take(keep, axis=0)
         ids = view.instance_ids.ravel()[keep] if with_ids and view.instance_ids is not None else None
         camera = np.full(len(keep), number, dtype=np.int32)
         parts.append(PointCloud(points, colors.astype(np.float32) / np.float32(255), camera, None, ids))

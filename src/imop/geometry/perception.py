@@ -18,7 +18,7 @@ WORKSPACE_UPPER = (0.7, 0.5, 1.6)
 # Points nearer than this to the supporting plane belong to it, metres.
 PLANE_THICKNESS = 0.008
 
-# Edge of the cells (metres) that are open ground if nothing in them or beside them leaves the plane by `FLAT`.
+# Edge of the cells (metres) that are open ground if nothing in or beside them leaves the plane by `FLAT`.
 OPEN_CELL, FLAT = 0.0125, 0.004
 
 # A point of the plane whose colour differs by more is a mark on it, unless less than this share is plain.
@@ -133,7 +133,7 @@ def open_ground(points: FloatArray) -> BoolArray:
     column, row = (((v - v.min()) / OPEN_CELL).astype(np.int64) for v in (x, y))
     taken = np.zeros((column.max() + 1, row.max() + 1), dtype=bool)
     taken[column[~flat], row[~flat]] = True
-    beside = ndimage.binary_dilation(taken, np.ones((3, 3)))
+    beside = ndimage.binary_dilation(taken, np.ones((3, 3), dtype=bool))
     return np.asarray(flat & ~beside[column, row])
 
 

@@ -81,18 +81,20 @@ def robust_procrustes(x: Tensor, y: Tensor, weights: Tensor, reaches: Sequence[f
         weights: (..., N), not negative.
         reaches: in the unit of the points, decreasing.
     """
-    R = t = None
-    for reach in (None, *reaches):
-        w = weights
-        if reach is not None:
-            off = (x @ R.mT + t.mT - y) / reach
-            w = weights / (1 + off.square().sum(-1)).square()
-        w = w / w.sum(-1, keepdim=True).clamp_min(torch.finfo(w.dtype).tiny)
-        mean_x, mean_y, _, _, covariance = _moments(x, y, w)
-        U, _, Vh = torch.linalg.svd(covariance)
-        R = _rotation(U, Vh)
-        t = mean_y - R @ mean_x
+    R, t = _fit(x, y, weights)
+    for reach in reaches:
+        off = (x @ R.mT + t.mT - y) / reach
+        R, t = _fit(x, y, weights / (1 + off.square().sum(-1)).square())
     return _pose(R, t)
+
+
+def _fit(x: Tensor, y: Tensor, weights: Tensor) -> tuple[Tensor, Tensor]:
+    """(..., 3, 3) rotation and (..., 3, 1) translation of least squares; any one of several if not unique."""
+    w = weights / weights.sum(-1, keepdim=True).clamp_min(torch.finfo(weights.dtype).tiny)
+    mean_x, mean_y, _, _, covariance = _moments(x, y, w)
+    U, _, Vh = torch.linalg.svd(covariance)
+    R = _rotation(U, Vh)
+    return R, mean_y - R @ mean_x
 
 
 def _moments(x: Tensor, y: Tensor, w: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
@@ -129,8 +131,9 @@ def _check(x: Tensor, y: Tensor, weights: Tensor | None) -> None:
 def _rotation(U: Tensor, Vh: Tensor) -> Tensor:
     """(..., 3, 3) the rotation nearest to U diag(s) Vh, for s not increasing."""
     # The last axis is turned over where the product of the others would be a reflection.
-    last = torch.linalg.det(U @ Vh)[..., None, None] * U[..., :, 2:] @ Vh[..., 2:, :]
-    return U[..., :, :2] @ Vh[..., :2, :] + last
+    last = torch.linalg.det(U @ Vh).sign()[..., None, None] * U[..., :, 2:] @ Vh[..., 2:, :]
+    R: Tensor = U[..., :, :2] @ Vh[..., :2, :] + last
+    return R
 
 
 def _rank(singular: Tensor, w: Tensor, dx: Tensor, dy: Tensor) -> Tensor:

@@ -84,7 +84,7 @@ class SelfFilter:
         points = as_array("points", points, (None, 3))
         data = self._posed(joint_positions, gripper_opening)
         # A point this far away is in no solid.
-        known = points if np.isfinite(points).all() else np.nan_to_num(points, nan=1e6, posinf=1e6, neginf=1e6)
+        known = np.nan_to_num(points, nan=1e6, posinf=1e6, neginf=1e6)
         p_model = se3.apply(se3.invert(self._T_world_model), known)
         robot = np.zeros(len(points), dtype=bool)
         centres, radii = _enclosing_spheres(self._bodies, data)

@@ -125,7 +125,8 @@ class MatchingNetwork(nn.Module):
             features: (M, C) `backbone(support)`, if it was computed before.
         """
         cloud, size = support.cloud[region], support.size
-        x, present = pad(gather(self.backbone(support) if features is None else features, region), cloud, size)
+        features = self.backbone(support) if features is None else features
+        x, present = pad(gather(features, region), cloud, size)
         p, _ = pad(support.points[region], cloud, size)
         n, _ = pad(support.levels[0].normals[region], cloud, size)
         own = relation(p[:, :, None], n[:, :, None], p[:, None], n[:, None])
@@ -176,8 +177,11 @@ class MatchingNetwork(nn.Module):
             distance = torch.cdist(_moved(T, sides.p_x), sides.p_y) / UNIT
             near = torch.stack([distance.log1p(), torch.exp(-distance), torch.exp(-distance / 4)], dim=1)
             # A linear layer over dimension 1: the attention wants its heads there.
-            weights = self.near_bias[k - 1]
-            bias = (weights.weight @ near.flatten(2) + weights.bias[:, None]).unflatten(2, distance.shape[1:])
+            linear = self.near_bias[k - 1]
+            assert isinstance(linear, nn.Linear)
+            bias = (linear.weight @ near.flatten(2) + linear.bias[:, None]).reshape(
+                len(T), -1, *near.shape[2:]
+            )
             to_y, to_x = _masked(bias, sides.y), _masked(bias.mT, sides.x)
         return self.region_cross[k](x, to_y, y), self.query_cross[k](y, to_x, x)
 

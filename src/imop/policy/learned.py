@@ -19,12 +19,13 @@ from imop.networks.graph import Graph, build_graph
 from imop.networks.model import Model
 from imop.policy.contacts import GRASP, SAME
 from imop.policy.evidence import Surface
+from imop.policy.inquiry import Inquiry
 from imop.policy.learned_region import FEWEST, ShownRegion, find_shown_regions
 from imop.policy.matcher import Hypothesis, Scene, Transition
 from imop.policy.matches import Matches
 from imop.policy.refine import SMALLEST
 from imop.policy.region import Region
-from imop.policy.search import Inquiry, Search
+from imop.policy.search import Search
 from imop.policy.sought import Sought, SoughtConfig, nodes_at
 from imop.policy.things import Things, without_held
 from imop.types import FloatArray

@@ -3,9 +3,10 @@
 import numpy as np
 
 from imop.geometry import se3
+from imop.policy.inquiry import Inquiry
 from imop.policy.objects import find_objects
 from imop.policy.region import Region
-from imop.policy.search import Inquiry, Search, SearchConfig
+from imop.policy.search import Search, SearchConfig
 from imop.policy.things import Things
 from tests.policy.scenes import RED, above, at, box, scene
 
