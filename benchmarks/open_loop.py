@@ -25,17 +25,15 @@ from joblib import delayed
 from rich.console import Console
 from rich.table import Table
 
-from imop.demos.rlbench import episodes, read_episode
 from imop.errors import ImopError, InvalidInput
-from imop.evaluation.appearance import Appearance
 from imop.evaluation.benchmark import parallel
+from imop.evaluation.cases import recorded_cases, simulated_cases
 from imop.evaluation.open_loop import Case, RecordedPoses, ask
 from imop.evaluation.open_loop_rows import Row, by_task
 from imop.evaluation.oracle import OraclePolicy
 from imop.evaluation.picture import Panel, save_picture
-from imop.evaluation.recordings import Recordings, objects_world
 from imop.evaluation.rollout import Policy
-from imop.evaluation.trials import Trial, make_policy, suite_trials
+from imop.evaluation.trials import make_policy, suite_trials
 from imop.files import replaced, user_cache
 from imop.geometry.accuracy import COARSE
 from imop.tasks.expert import ExpertFailed
@@ -82,43 +80,6 @@ class Options:
 
 def policy_of(method: str, poses: RecordedPoses) -> Policy:
     return OraclePolicy(poses) if method == "oracle" else make_policy(method)
-
-
-def recorded_cases(demos: Path) -> list[Callable[[], Case]]:
-    """One case for each episode that has others of its task and variation."""
-    read = {path: read_episode(path) for path in episodes(demos)}
-    kind = {path: (episode.task, episode.variation) for path, episode in read.items()}
-    found: list[Callable[[], Case]] = []
-    for path, episode in read.items():
-        others = {p.name: read[p] for p in read if p != path and kind[p] == kind[path]}
-        if others:
-            found.append(partial(Case, episode.task, path.name, episode, others))
-    return found
-
-
-def simulated_cases(options: Options) -> list[Callable[[], Case]]:
-    """One case for each task and variation."""
-    tasks = tuple(filter(None, options.tasks.split(",")))
-    trials = suite_trials(options.suite, options.split, tasks, options.scenes, options.seed, options.instance)
-    groups: dict[tuple[str, int], list[Trial]] = {}
-    for task, of_task in trials.items():
-        for trial in of_task:
-            groups.setdefault((task, trial.variation), []).append(trial)
-    return [partial(simulated_case, task, group, options.cache) for (task, _), group in groups.items()]
-
-
-def simulated_case(task: str, trials: list[Trial], cache: Path) -> Case:
-    """The demonstration and the scenes of one task and variation, but for scenes that the expert fails in.
-
-    Raises:
-        ExpertFailed, NoRoom: if there is no demonstration.
-    """
-    recordings = Recordings(cache)
-    shown = recordings.demonstration(trials[0])
-    scenes = {str(trial.seed): recordings.scene(trial) for trial in trials}
-    queries = {name: scene for name, scene in scenes.items() if scene is not None}
-    appearance = Appearance(objects_world(trials[0]))
-    return Case(task, str(shown.seeds["episode"]), shown, queries, appearance)
 
 
 def evaluate(make_case: Callable[[], Case], methods: Iterable[str], pictures: Path | None) -> list[Row]:
@@ -201,7 +162,9 @@ def measure(options: Options, console: Console) -> dict[str, dict[str, Any]]:
         raise InvalidInput("methods", "oracle", "methods that need no object poses, for recordings")
     for method in methods:
         policy_of(method, RecordedPoses())
-    cases = recorded_cases(options.demos) if options.demos else simulated_cases(options)
+    tasks = tuple(filter(None, options.tasks.split(",")))
+    trials = suite_trials(options.suite, options.split, tasks, options.scenes, options.seed, options.instance)
+    cases = recorded_cases(options.demos) if options.demos else simulated_cases(trials, options.cache)
     if not cases:
         raise InvalidInput("demos", f"{options.demos}", "at least two episodes of one task and variation")
     work = [delayed(evaluate)(case, methods, options.pictures) for case in cases]

@@ -6,7 +6,7 @@ import pytest
 from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, estimate_normals, fuse
-from imop.geometry.perception import Perception, find_ground, supporting_plane
+from imop.geometry.perception import Perception, find_ground, open_ground, supporting_plane
 from tests.geometry.test_cloud import flat_view, observation
 
 
@@ -105,3 +105,39 @@ def test_a_mark_on_the_table_is_not_bare_ground():
 def test_a_patterned_table_is_bare_ground():
     cloud = tabletop(lambda p: np.floor(p[:, 0] / 0.05) % 2 == 0)
     assert np.array_equal(find_ground(cloud).bare, cloud.points[:, 2] < 0.008)
+
+
+def table_points(tilt=0.0, noise=0.0):
+    """A table of points 5 mm apart with a box of 6 cm on it, and which points are of the box."""
+    rng = np.random.default_rng(0)
+    x, y = (v.ravel() for v in np.meshgrid(np.arange(-0.3, 0.3, 0.005), np.arange(-0.3, 0.3, 0.005)))
+    table = np.c_[x, y, 0.75 + tilt * x + rng.normal(0, noise, len(x))]
+    box = np.c_[rng.uniform(-0.03, 0.03, (400, 2)), 0.75 + rng.uniform(0.005, 0.06, 400)]
+    return np.r_[table, box], np.arange(len(table) + 400) >= len(table)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.01])
+def test_open_ground_is_the_table_away_from_things(tilt):
+    points, box = table_points(tilt, noise=0.0005)
+    bare = open_ground(points)
+    from_box = np.abs(points[:, :2]).max(axis=1) - 0.03
+    assert not bare[box].any() and not bare[from_box < 0.01].any()
+    assert bare[from_box > 0.03].all()
+
+
+def test_a_rough_surface_has_no_open_ground():
+    points, _ = table_points(noise=0.01)
+    assert open_ground(points).mean() < 0.1
+    assert not open_ground(points[:20]).any()
+
+
+def test_normals_of_open_ground_are_those_of_the_search():
+    points, box = table_points(tilt=0.01)
+    camera = np.zeros(len(points), np.int32)
+    cloud = PointCloud(points, np.zeros((len(points), 3), np.float32), camera)
+    above = np.array([[0.0, 0.0, 2.0]])
+    searched = estimate_normals(cloud, above).normals
+    known = estimate_normals(cloud, above, flat=open_ground(points)).normals
+    away = np.abs(points[:, :2]).max(axis=1) > 0.05
+    np.testing.assert_allclose(known[away], searched[away], atol=1e-3)
+    np.testing.assert_allclose(known[box], searched[box], atol=1e-9)

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from imop.errors import InvalidInput
 from imop.geometry import se3
-from imop.geometry.procrustes import weighted_procrustes
+from imop.geometry.procrustes import robust_procrustes, weighted_procrustes
 
 seeds = st.integers(0, 10_000)
 
@@ -139,3 +139,31 @@ def test_gradients_stay_finite_where_the_motion_is_not_unique():
 def test_bad_input_is_named(x, y, weights, field):
     with pytest.raises(InvalidInput, match=field):
         weighted_procrustes(x, y, weights)
+
+
+@given(seeds)
+def test_the_same_with_and_without_gradients(seed):
+    rng = np.random.default_rng(seed)
+    x, y = (torch.from_numpy(rng.normal(size=(6, 3))) for _ in range(2))
+    plain = weighted_procrustes(x, y)
+    watched = weighted_procrustes(x.clone().requires_grad_(), y)
+    torch.testing.assert_close(watched.T_y_x.detach(), plain.T_y_x, atol=1e-6, rtol=0)
+    assert torch.equal(watched.rank, plain.rank)
+
+
+@given(seeds)
+def test_the_robust_fit_takes_no_notice_of_few_wrong_pairs(seed):
+    rng = np.random.default_rng(seed)
+    T, x = random_pose(rng), torch.from_numpy(rng.normal(size=(40, 3)))
+    y = apply(T, x)
+    y[:8] += torch.from_numpy(rng.normal(size=(8, 3)))
+    found = robust_procrustes(x, y, torch.ones(40, dtype=torch.float64), (1.0, 0.3, 0.1, 0.03, 0.01))
+    torch.testing.assert_close(found, T, atol=1e-3, rtol=0)
+
+
+def test_the_robust_fit_is_least_squares_without_reaches_and_never_nan(rng):
+    x, y = (torch.from_numpy(rng.normal(size=(3, 9, 3))) for _ in range(2))
+    weights = torch.from_numpy(rng.uniform(0.2, 1, (3, 9)))
+    expected = weighted_procrustes(x, y, weights).T_y_x
+    torch.testing.assert_close(robust_procrustes(x, y, weights, ()), expected, atol=1e-9, rtol=0)
+    assert torch.isfinite(robust_procrustes(x, y, torch.zeros_like(weights), (0.1,))).all()

@@ -177,6 +177,17 @@ def test_matching_of_a_batch_is_that_of_its_pairs(attention):
 
 
 @pytest.mark.parametrize("attention", ["global", "graph"])
+def test_a_region_may_be_described_once_for_many_queries(attention):
+    support, queries = build_graph(tabletop(0), SMALL), [build_graph(tabletop(s), SMALL) for s in (1, 2)]
+    region, network = torch.arange(0, 30), MatchingNetwork(MatchingConfig(TINY, attention=attention)).eval()
+    with torch.no_grad():
+        described = network.describe(support, region, network.backbone(support))
+        for query in queries:
+            once, anew = network.match(described, query), network(support, region, query)
+            torch.testing.assert_close(once.last, anew.last)
+
+
+@pytest.mark.parametrize("attention", ["global", "graph"])
 def test_every_parameter_of_the_matching_network_learns(attention):
     support, query = build_graph(tabletop(0), SMALL), build_graph(tabletop(1), SMALL)
     network = MatchingNetwork(MatchingConfig(TINY, attention=attention))

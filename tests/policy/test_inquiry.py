@@ -60,3 +60,27 @@ def test_the_matchers_opinion_decides_between_equal_explanations():
 
         best = inquiry([THERE, other], opinion=opinion, weight=0.1).search(np.stack(motions))[0]
         assert se3.translation_distance(best.T_query_support @ HERE, wanted @ HERE) < 0.01
+
+
+def test_what_was_followed_is_followed_on_and_mended():
+    hint = at(0.004, -0.003, 0.0) @ T
+    found = inquiry([THERE], [hint]).followed()
+    assert se3.translation_distance(found[0].T_query_support @ HERE, THERE) < 0.002
+    assert found[0].score > 0.9
+
+
+def test_nothing_is_followed_at_the_beginning_or_where_it_is_gone():
+    assert inquiry([THERE]).followed() == ()
+    assert inquiry([at(0.0, 0.3)], [T]).followed() == ()
+
+
+def test_between_the_hint_and_what_the_gripper_did_nothing_is_followed():
+    # One box where the hint says, and an equal one where it stood in the demonstration.
+    assert inquiry([THERE, HERE], [T]).followed() == ()
+
+
+def test_around_is_where_the_region_may_be():
+    search = inquiry([THERE])._search
+    points = np.stack([THERE[:3, 3], HERE[:3, 3], THERE[:3, 3] + [0, 0, 0.3], [-0.4, 0.4, 0.8]])
+    np.testing.assert_array_equal(search.around(points, T[None]), [True, False, False, False])
+    np.testing.assert_array_equal(search.around(points, np.stack([T, np.eye(4)])), [True, True, False, False])

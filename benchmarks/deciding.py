@@ -1,0 +1,174 @@
+"""How long policies take to decide: asked in turn for the same recorded states, one after the other.
+
+    python benchmarks/deciding.py --suite tabletop --json FILE
+    python benchmarks/deciding.py --demos ../shared/data/rlbench_demos --json FILE
+
+From images to the action: clouds, the robot taken out of them, networks, search and judgement. One process
+with as many threads as it likes, on a machine that does nothing else. Milliseconds differ from machine to
+machine and from hour to hour; the ratios to the last method, asked for the same states within the same
+second, do not.
+"""
+
+import json
+import shlex
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+from imop.errors import ImopError, NoConfidentMatch
+from imop.evaluation.cases import recorded_cases, simulated_cases
+from imop.evaluation.open_loop import Case, ToldRouter
+from imop.evaluation.trials import make_policy, suite_trials
+from imop.files import replaced, user_cache
+from imop.policy.one_shot import OneShotPolicy
+from imop.tasks.expert import ExpertFailed
+from imop.tasks.layout import NoRoom
+
+
+@dataclass
+class Options:
+    """Settings of the benchmark.
+
+    Attributes:
+        suite: of the simulated tasks.
+        split: which of its tasks.
+        tasks: comma-separated names within the suite; all of the split by default.
+        demos: a folder in RLBench's layout instead of a suite.
+        methods: comma-separated; ratios are to the last one.
+        scenes: per task, with its variations in turn.
+        seed: of the first scene.
+        json: where the results and every single time go.
+        cache: where recorded scenes are kept.
+    """
+
+    suite: str = "tabletop"
+    split: str = "all"
+    tasks: str = ""
+    demos: Path | None = None
+    methods: str = "learned,registration"
+    scenes: int = 3
+    seed: int = 0
+    json: Path | None = None
+    cache: Path = field(default_factory=user_cache)
+
+
+@dataclass(frozen=True)
+class Times:
+    """Milliseconds of each method for one state.
+
+    Attributes:
+        task: its name.
+        query: name of the scene.
+        step: of the demonstration.
+        milliseconds: by method.
+    """
+
+    task: str
+    query: str
+    step: int
+    milliseconds: dict[str, float]
+
+
+def decisions(case: Case, methods: list[str]) -> Iterator[Times]:
+    """Every method asked for every step of every scene, told which step it is."""
+    shown = case.demonstration
+    policies: dict[str, tuple[OneShotPolicy, ToldRouter]] = {}
+    for method in methods:
+        policy = make_policy(method)
+        assert isinstance(policy, OneShotPolicy)
+        policy.router = told = ToldRouter(policy.router)
+        policy.watch(shown.stripped())
+        policies[method] = policy, told
+    for query, recorded in case.queries.items():
+        for policy, _ in policies.values():
+            policy.reset()
+        for step in range(min(len(shown), len(recorded))):
+            observation = recorded.keyframes[step].observation.stripped()
+            taken = {}
+            for method, (policy, told) in policies.items():
+                told.step = step
+                started = time.perf_counter()
+                with suppress(NoConfidentMatch):
+                    policy.act(observation)
+                taken[method] = 1000 * (time.perf_counter() - started)
+                told.go_on()
+            yield Times(case.task, query, step, taken)
+
+
+def summary(rows: list[Times], methods: list[str]) -> dict[str, dict[str, float]]:
+    """Milliseconds of every method, and how many times faster than the last one it is in the median."""
+    found = {}
+    for method in methods:
+        taken, reference = (np.array([row.milliseconds[m] for row in rows]) for m in (method, methods[-1]))
+        found[method] = {
+            "n": len(rows),
+            "median": float(np.median(taken)),
+            "mean": float(taken.mean()),
+            "p90": float(np.quantile(taken, 0.9)),
+            "times_faster": float(np.median(reference) / np.median(taken)),
+        }
+    return found
+
+
+def show(found: dict[str, dict[str, float]], console: Console) -> None:
+    table = Table(title="milliseconds to decide")
+    for name in ("method", "n", "median", "mean", "90 %", "times faster"):
+        table.add_column(name, justify="left" if name == "method" else "right")
+    for method, s in found.items():
+        numbers = (f"{s[name]:.0f}" for name in ("n", "median", "mean", "p90"))
+        table.add_row(method, *numbers, f"{s['times_faster']:.2f}")
+    console.print(table)
+
+
+def measure(options: Options) -> list[Times]:
+    """All times.
+
+    Raises:
+        ImopError: for options that do not fit, or recordings that cannot be used.
+    """
+    tasks = tuple(filter(None, options.tasks.split(",")))
+    trials = suite_trials(options.suite, options.split, tasks, options.scenes, options.seed, 0)
+    cases = recorded_cases(options.demos) if options.demos else simulated_cases(trials, options.cache)
+    rows = []
+    for make_case in cases:
+        try:
+            case = make_case()
+        except (ExpertFailed, NoRoom) as error:
+            print(f"left out: {error}", file=sys.stderr)
+            continue
+        rows += list(decisions(case, options.methods.split(",")))
+    return rows
+
+
+def main() -> int:
+    options = tyro.cli(Options, description=__doc__)
+    console = Console()
+    try:
+        rows = measure(options)
+    except ImopError as error:
+        console.print(f"[red]{error}")
+        return 2
+    found = summary(rows, options.methods.split(","))
+    show(found, console)
+    if options.json:
+        report = {
+            "methods": found,
+            "suite": str(options.demos or f"{options.suite} {options.split}"),
+            "command": shlex.join(["python", *sys.argv]),
+            "rows": [asdict(row) for row in rows],
+        }
+        with replaced(options.json) as temporary:
+            temporary.write_text(json.dumps(report, indent=1))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,18 @@
+import pytest
+
+from imop.errors import InvalidInput
+from imop.evaluation.cases import recorded_cases, simulated_cases
+from imop.evaluation.trials import Trial, suite_trials
+
+
+def test_one_case_for_each_task_and_variation(tmp_path):
+    seeds_and_variations = ((0, 0), (1, 1), (2, 0))
+    trials = [Trial("tabletop/press_buttons", seed, kind, 0) for seed, kind in seeds_and_variations]
+    assert len(simulated_cases({"press_buttons": trials}, tmp_path)) == 2
+    everything = suite_trials("tabletop", "novel", (), 1, 0, 0)
+    assert len(simulated_cases(everything, tmp_path)) == len(everything)
+
+
+def test_a_folder_without_episodes_has_no_cases(tmp_path):
+    with pytest.raises(InvalidInput):
+        recorded_cases(tmp_path)
