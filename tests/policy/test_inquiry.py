@@ -1,6 +1,9 @@
 """Confirming one motion without a search, on boxes."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from imop.geometry import se3
 from imop.policy.inquiry import Inquiry
@@ -84,3 +87,14 @@ def test_around_is_where_the_region_may_be():
     points = np.stack([THERE[:3, 3], HERE[:3, 3], THERE[:3, 3] + [0, 0, 0.3], [-0.4, 0.4, 0.8]])
     np.testing.assert_array_equal(search.around(points, T[None]), [True, False, False, False])
     np.testing.assert_array_equal(search.around(points, np.stack([T, np.eye(4)])), [True, True, False, False])
+
+
+def test_the_motion_begun_is_kept_if_it_explains_about_as_much():
+    # The gripper has not moved since the demonstration, nor has the box.
+    begun = inquiry([HERE], [np.eye(4)])
+    turned = replace(begun.repeated()[0], T_query_support=at(0.01, 0.0, 0.0))
+    assert begun.kept((turned,))[0].T_query_support == pytest.approx(np.eye(4), abs=1e-2)
+    elsewhere = replace(turned, T_query_support=at(0.1, 0.0, 0.0))
+    assert begun.kept((elsewhere,)) == (elsewhere,)
+    gone = inquiry([THERE], [np.eye(4)])
+    assert gone.kept((turned,)) == (turned,)

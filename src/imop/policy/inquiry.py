@@ -28,7 +28,7 @@ TURNED = 0.35
 # A likely motion that explains this share of what a trusted one does has to be compared with it.
 RIVAL = 0.85
 # A thing that has moved as before is explained at a glance by this share of what it is in the end.
-STILL = 0.75
+STILL = 0.65
 # Not mended yet, a motion is worth a try that explains this share of what the best does.
 TURNABLE = 0.5
 
@@ -65,7 +65,7 @@ class Inquiry:
         if not self._begun:
             return ()
         trusted = np.stack([*self.hints, self._T_repeated])
-        likely = self._unrivalled(trusted, STILL * self._config.followed)
+        likely = self._unrivalled(trusted, STILL * self._config.sure)
         if not likely:
             return ()
         hint, straight = likely
@@ -74,7 +74,7 @@ class Inquiry:
         near = np.stack([T, upright(T, self._center), straight])
         different = near[distinct(near, self._center, len(near), *SAME_MOTION)]
         ordered = self._ordered([self._judge.judge(T) for T in different])
-        return ordered if ordered[0].score >= self._config.followed else ()
+        return ordered if ordered[0].score >= self._config.sure else ()
 
     def confirmed(self, trusted: FloatArray) -> tuple[Hypothesis, ...]:
         """The motions next to the best of trusted ones (H, 4, 4); none if it does not explain the scene."""
@@ -125,6 +125,14 @@ class Inquiry:
         return self._ordered(
             found + [self._upright(h.T_query_support) for h in found[: self._config.righted]]
         )
+
+    def kept(self, found: tuple[Hypothesis, ...]) -> tuple[Hypothesis, ...]:
+        """What was found, or the motion begun if it leads there and explains the scene about as well."""
+        repeated = self.finished(self._T_repeated)
+        there = self._near(repeated.T_query_support[None], found[0].T_query_support)[0]
+        if self._begun and there and repeated.score >= RIVAL * found[0].score:
+            return (repeated, *found)
+        return found
 
     def repeated(self) -> tuple[Hypothesis, ...]:
         """The demonstrated motion of the gripper as the only hypothesis."""

@@ -233,4 +233,6 @@ class LearnedStep:
         certain = opinion(T_part[None])[0] > CERTAIN
         contradicted = for_whole < CONTRADICTED * self._sought.opinion(near, T_part[None], TIGHT)[0]
         explained = max(AS_GOOD * whole[0].score, closer.finished(T_whole).score + BETTER)
-        return part if certain and contradicted and part[0].score > explained else whole
+        if not (certain and contradicted and part[0].score > explained):
+            return whole
+        return closer.kept(part)

@@ -33,7 +33,6 @@ class SearchConfig:
         tilt: share that it loses for tilting things by `inquiry.TILTED` or more; twice for turning them over.
         change: share that it loses for another pose than the demonstrated motion leads to, once begun.
         sure: score from which a trusted motion needs no search.
-        followed: the same of a motion that was right in the step before.
         opinion: what full support by the matcher's opinion adds to the score when motions are compared.
     """
 
@@ -46,7 +45,6 @@ class SearchConfig:
     tilt: float = 0.35
     change: float = 0.12
     sure: float = 0.7
-    followed: float = 0.6
     opinion: float = 0.1
 
 
