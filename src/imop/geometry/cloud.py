@@ -40,7 +40,8 @@ class PointCloud:
     def select(self, which: NDArray[np.bool_] | NDArray[np.integer]) -> "PointCloud":
         """The points picked by a mask (N,) or by indices."""
         # Rows are taken by index twice as fast as by a mask, which would be searched for every attribute.
-        rows = np.flatnonzero(which) if which.dtype == bool else which
+        picked = np.asarray(which)
+        rows = np.flatnonzero(picked) if picked.dtype == bool else picked
         return PointCloud(
             self.points.take(rows, axis=0),
             self.colors.take(rows, axis=0),
