@@ -146,11 +146,18 @@ def crop(
     cloud: PointCloud, lower: FloatArray | Sequence[float], upper: FloatArray | Sequence[float]
 ) -> PointCloud:
     """The points inside the axis-aligned box, bounds (3,) in metres, included."""
-    inside = np.ones(len(cloud), dtype=bool)
+    return cloud.select(inside_box(cloud.points, lower, upper))
+
+
+def inside_box(
+    points: FloatArray, lower: FloatArray | Sequence[float], upper: FloatArray | Sequence[float]
+) -> BoolArray:
+    """(N,) which points (N, 3) are inside the axis-aligned box, bounds (3,) included."""
+    inside = np.ones(len(points), dtype=bool)
     # Column by column: reducing rows of three is several times as slow.
-    for column, low, high in zip(cloud.points.T, lower, upper, strict=True):
+    for column, low, high in zip(points.T, lower, upper, strict=True):
         inside &= (column >= low) & (column <= high)
-    return cloud.select(inside)
+    return inside
 
 
 def voxel_downsample(cloud: PointCloud, size: float) -> PointCloud:

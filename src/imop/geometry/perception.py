@@ -114,9 +114,9 @@ def supporting_plane(cloud: PointCloud, tilt: float = 0.2, bin_height: float = 0
 
 def _most_populated(z: FloatArray, bin_height: float) -> float:
     """Middle of the slice that most of the heights (N,) are in, metres."""
-    slices = np.floor(z / bin_height).astype(np.int64)
-    lowest = slices.min()
-    return float((np.argmax(np.bincount(slices - lowest)) + lowest + 0.5) * bin_height)
+    # Not a histogram: a single point far away would make it huge.
+    slices, counts = np.unique(np.floor(z / bin_height).astype(np.int64), return_counts=True)
+    return float((slices[np.argmax(counts)] + 0.5) * bin_height)
 
 
 def open_ground(points: FloatArray) -> BoolArray:

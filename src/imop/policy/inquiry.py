@@ -161,9 +161,6 @@ class Inquiry:
     def _moved(self, T: FloatArray, part: int = -1) -> FloatArray:
         return self.things.refine(self._search.coarse[part], T)
 
-    def _refined(self, T: FloatArray) -> Hypothesis:
-        return self._judge.judge(self._moved(T))
-
     def finished(self, T: FloatArray) -> Hypothesis:
         """The nearest motion to `T` (4, 4) that lays the region onto what was observed, judged."""
         return self._judge.judge(self.things.refine(self._search.fine, T, FINEST))

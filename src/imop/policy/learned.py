@@ -113,10 +113,12 @@ class LearnedStep:
         self, query: Scene, standing: PointCloud, hints: Sequence[FloatArray]
     ) -> tuple[Hypothesis, ...]:
         """Where the region is if it has moved as what was acted on before; no network need be asked."""
+        if not hints:
+            return ()
         search = self._sought.search
         near = standing.select(search.around(standing.points, search.likely(query, hints)))
         near = without_held(near, query, self._sought.region)
-        if not hints or len(near) < SMALLEST:
+        if len(near) < SMALLEST:
             return ()
         things = Things(query, near)
         found = Inquiry(search, things, hints).followed()

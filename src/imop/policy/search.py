@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from imop.geometry import se3
-from imop.geometry.cloud import farthest_points
+from imop.geometry.cloud import farthest_points, inside_box
 from imop.geometry.neighbours import nearest
 from imop.policy.evidence import Template
 from imop.policy.matcher import Scene
@@ -84,10 +84,7 @@ class Search:
         corners = np.stack(np.meshgrid(*np.stack([whole.min(axis=0), whole.max(axis=0)]).T), axis=-1)
         reached = np.zeros(len(points), dtype=bool)
         for box in se3.apply(motions, corners.reshape(-1, 3)):
-            inside = np.ones(len(points), dtype=bool)
-            for column, low, high in zip(points.T, box.min(axis=0), box.max(axis=0), strict=True):
-                inside &= (column > low - BESIDE) & (column < high + BESIDE)
-            reached |= inside
+            reached |= inside_box(points, box.min(axis=0) - BESIDE, box.max(axis=0) + BESIDE)
         return reached
 
     def _thing(self, before: Scene) -> FloatArray:
