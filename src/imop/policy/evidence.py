@@ -240,6 +240,17 @@ class Judge:
         p_query = self._query.cloud.points[counterpart[good]]
         return Hypothesis(T_query_support, score, fine.points[good], p_query)
 
+    def in_view(self, T_query_support: FloatArray) -> float:
+        """Share 0 .. 1 of the moved region, without its context, that is explained, but for what is hidden."""
+        size, weight = self._template.size, self._template.fine_weight[: self._template.size]
+        own = moved(self._template.fine.select(np.arange(size)), T_query_support)
+        assert own.normals is not None
+        explained, _ = self._query.explain(own, np.eye(4))
+        hidden, _ = self._query.seen(own.points, own.normals)
+        got = weight * explained
+        missing = weight * (1 - explained) * ~hidden
+        return float(got.sum() / max((got + missing).sum(), 1e-9))
+
     def _backward(self, T_support_query: FloatArray) -> float:
         sample = self._query.sample
         around = sample.select(self._template.surface.near(se3.apply(T_support_query, sample.points)))

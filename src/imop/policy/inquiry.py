@@ -8,8 +8,8 @@ from imop.geometry import se3
 from imop.policy.evidence import Judge
 from imop.policy.hypotheses import distinct
 from imop.policy.matcher import Hypothesis
-from imop.policy.refine import CLOSE, FINEST, upright
-from imop.policy.search import Search
+from imop.policy.refine import CLOSE, FINEST, NEARBY, upright
+from imop.policy.search import Search, upright_motions
 from imop.policy.things import Things, middle
 from imop.types import BoolArray, FloatArray
 
@@ -29,6 +29,12 @@ TURNED = 0.35
 RIVAL = 0.85
 # A thing that has moved as before is explained at a glance by this share of what it is in the end.
 STILL = 0.65
+# One that has moved as before is explained by this score at least, and as well as anything that is sure but
+# for what the cameras cannot see of it, for the hand is before it. Of what has bent they see that it is gone.
+MOSTLY = 0.55
+# Turns in which what is bent is tried, how much of its score one loses for half a turn, and the share of the
+# best that is not worth bending for.
+TURNS, BENDING, NEARLY = 24, 0.1, 0.9
 # Not mended yet, a motion is worth a try that explains this share of what the best does.
 TURNABLE = 0.5
 
@@ -74,7 +80,9 @@ class Inquiry:
         near = np.stack([T, upright(T, self._center), straight])
         different = near[distinct(near, self._center, len(near), *SAME_MOTION)]
         ordered = self._ordered([self._judge.judge(T) for T in different])
-        return ordered if ordered[0].score >= self._config.sure else ()
+        best, sure = ordered[0], self._config.sure
+        seen = best.score >= MOSTLY and self._judge.in_view(best.T_query_support) >= sure
+        return ordered if best.score >= sure or seen else ()
 
     def confirmed(self, trusted: FloatArray) -> tuple[Hypothesis, ...]:
         """The motions next to the best of trusted ones (H, 4, 4); none if it does not explain the scene."""
@@ -134,9 +142,32 @@ class Inquiry:
             return (repeated, *found)
         return found
 
+    def bent(self, found: tuple[Hypothesis, ...], center: FloatArray) -> tuple[Hypothesis, ...]:
+        """What was found, or what explains the scene better in another turn about a point (3,) of the region.
+
+        What bends ends about where it would if it did not, but in another direction.
+        """
+        T = found[0].T_query_support
+        here, there = center[None], se3.apply(T, center[None])
+        ends = [self._settled(turn @ T) for turn in upright_motions(there[0], there, TURNS)]
+        ends = [end for T in ends for end in (T, upright(T, self._center))]
+        ends = [end for end in ends if np.linalg.norm(se3.apply(end, here) - there) < ELSEWHERE]
+        if not ends:
+            return found
+        judged = self._judged(ends)
+        turned = se3.rotation_distance(np.stack([h.T_query_support for h in judged]), T)
+        best = judged[int(np.argmax([h.score for h in judged] - BENDING * turned / np.pi))]
+        if self.finished(T).score >= NEARLY * best.score:
+            return found
+        return self.kept((best, *found))
+
     def repeated(self) -> tuple[Hypothesis, ...]:
         """The demonstrated motion of the gripper as the only hypothesis."""
         return (self._judge.judge(self._T_repeated),)
+
+    def slipped(self) -> Hypothesis:
+        """Where the gripper has taken the region, but for a slip in the hand."""
+        return self.finished(self._moved(self._T_repeated))
 
     def alike(self, T: FloatArray, other: FloatArray) -> bool:
         """Whether two motions carry the region to about the same place, turned about alike."""
@@ -157,6 +188,11 @@ class Inquiry:
         """Those of motions that explain, at a glance, at least so much of what the best of them does."""
         glances = self._judge.glance(np.stack(motions))
         return [T for T, glance in zip(motions, glances, strict=True) if glance >= share * glances.max()]
+
+    def _settled(self, T: FloatArray) -> FloatArray:
+        """The motion next to `T`, which is near already."""
+        T = self.things.refine(self._search.coarse[-1], T, NEARBY)
+        return self.things.refine(self._search.fine, T, FINEST)
 
     def _moved(self, T: FloatArray, part: int = -1) -> FloatArray:
         return self.things.refine(self._search.coarse[part], T)

@@ -38,8 +38,12 @@ TIGHT = 0.015
 # where the whole is by this score, and about as well as the whole.
 BENT = 0.7
 NEXT_TO = 0.05
+# What is explained better than this does not bend.
+STIFF = 0.8
 CERTAIN, CONTRADICTED = 0.8, 0.9
 BETTER, AS_GOOD = 0.1, 0.85
+# A hand that is as wide open as it was shown, up to this share of its stroke, holds what it held.
+AS_WIDE = 0.04
 # What the hand takes is somewhere else than the region says only if it is explained there by this score.
 FOUND = 0.6
 # A region that no motion explains better than this may have another colour. What is found by its shape alone
@@ -86,7 +90,9 @@ class LearnedStep:
             self._taken = prepare(taken)
             rest = region.whole.select(~within(region.whole.points, taken.cloud.points, SAME))
             self._rest = Surface(rest, ())
-        self._part = region.next_to(step.action.T_world_gripper[:3, 3], NEXT_TO)
+        self._goal = step.action.T_world_gripper[:3, 3]
+        self._part = region.next_to(self._goal, NEXT_TO)
+        self._opening = step.before.observation.gripper_opening
         tip = step.before.observation.T_world_gripper[None, :3, 3]
         touched = len(self._part.cloud) >= SMALLEST and within(tip, self._part.cloud.points, GRASP)[0]
         self._in_hand = shown.holding and bool(touched)
@@ -121,7 +127,10 @@ class LearnedStep:
         if len(near) < SMALLEST:
             return ()
         things = Things(query, near)
-        found = Inquiry(search, things, hints).followed()
+        inquiry = Inquiry(search, things, hints)
+        found = inquiry.followed()
+        if not found and self._in_hand and abs(query.observation.gripper_opening - self._opening) < AS_WIDE:
+            return self._held(inquiry, (inquiry.slipped(),))
         if found and self._taken is not None:
             taken = self._there(self._taken, things, found[0].T_query_support)
             return found if taken.score > BENT else ()
@@ -148,7 +157,7 @@ class LearnedStep:
         """Where the whole region is, or the part of it that is next to the gripper."""
         sought, things = self._sought, inquiry.things
         if confirmed := inquiry.confirmed(sought.trusted(matches, fit)):
-            return confirmed
+            return confirmed if self._in_hand or confirmed[0].score > STIFF else self._bent(inquiry, confirmed)
         whole = inquiry.search(np.concatenate([fit, sought.seeds(matches, things)]))
         if whole[0].score > BENT:
             return whole
@@ -156,7 +165,9 @@ class LearnedStep:
         whole = inquiry.search(np.concatenate([best, sought.anywhere(things)]))
         if whole[0].score > BENT:
             return whole
-        return self._held(inquiry, whole) if self._in_hand else self._unbent(matches, inquiry, whole)
+        if self._in_hand:
+            return self._held(inquiry, whole)
+        return self._bent(inquiry, self._unbent(matches, inquiry, whole))
 
     @staticmethod
     def _there(taken: Sought, things: Things, T_whole: FloatArray) -> Hypothesis:
@@ -213,6 +224,14 @@ class LearnedStep:
         held = closer.repeated()
         alike = closer.alike(held[0].T_query_support, whole[0].T_query_support)
         return whole if alike and whole[0].score > held[0].score else held
+
+    def _bent(self, inquiry: Inquiry, found: tuple[Hypothesis, ...]) -> tuple[Hypothesis, ...]:
+        """Where what is next to the gripper is, if it points elsewhere than where it was found."""
+        points = self._part.cloud.points
+        if len(points) < SMALLEST:
+            return found
+        goal = points[nearest(self._goal[None], points)[1][0, 0]]
+        return Inquiry(self._search_part, inquiry.things, inquiry.hints).bent(found, goal)
 
     def _unbent(
         self, matches: Matches, inquiry: Inquiry, whole: tuple[Hypothesis, ...]

@@ -8,7 +8,7 @@ from imop.geometry import se3
 from imop.types import FloatArray
 
 STAGES = (0.04, 0.02, 0.01)
-CLOSE, FINEST = STAGES[-1:], (0.005,)
+NEARBY, CLOSE, FINEST = STAGES[1:], STAGES[2:], (0.005,)
 # small_gicp takes fewer points for a mistake.
 SMALLEST = 10
 

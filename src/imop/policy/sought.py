@@ -50,7 +50,7 @@ class SoughtConfig:
     turns: int = 24
     threads: int = 1
     search: SearchConfig = field(
-        default_factory=lambda: SearchConfig(finished=2, righted=3, turned=4, turn=0.05, sure=0.72)
+        default_factory=lambda: SearchConfig(finished=2, righted=3, turned=4, turn=0.02, sure=0.72)
     )
     seed: int = 0
 
