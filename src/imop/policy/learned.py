@@ -24,7 +24,7 @@ from imop.policy.learned_region import FEWEST, ShownRegion, find_shown_regions
 from imop.policy.matcher import Hypothesis, Scene, Transition
 from imop.policy.matches import Matches
 from imop.policy.refine import SMALLEST
-from imop.policy.region import Region
+from imop.policy.region import ENOUGH, Region
 from imop.policy.search import Search
 from imop.policy.sought import Sought, SoughtConfig, nodes_at
 from imop.policy.things import Things, without_held
@@ -130,7 +130,8 @@ class LearnedStep:
         inquiry = Inquiry(search, things, hints)
         found = inquiry.followed()
         if not found and self._in_hand and abs(query.observation.gripper_opening - self._opening) < AS_WIDE:
-            return self._held(inquiry, (inquiry.slipped(),))
+            slipped = inquiry.slipped()
+            return (slipped,) if slipped.score > BENT else self._carried(things)
         if found and self._taken is not None:
             taken = self._there(self._taken, things, found[0].T_query_support)
             return found if taken.score > BENT else ()
@@ -218,17 +219,21 @@ class LearnedStep:
         cloud = self._before.cloud
         return cloud.select(~self._before.ground.bare & ~within(cloud.points, region.cloud.points, SAME))
 
-    def _held(self, inquiry: Inquiry, whole: tuple[Hypothesis, ...]) -> tuple[Hypothesis, ...]:
+    def _carried(self, things: Things) -> tuple[Hypothesis, ...]:
         """What is in the hand has moved as the gripper has, whatever its colour."""
-        closer = Inquiry(self._search_part, inquiry.things.colorless())
-        held = closer.repeated()
-        alike = closer.alike(held[0].T_query_support, whole[0].T_query_support)
-        return whole if alike and whole[0].score > held[0].score else held
+        return Inquiry(self._search_part, things.colorless()).repeated()
+
+    def _held(self, inquiry: Inquiry, whole: tuple[Hypothesis, ...]) -> tuple[Hypothesis, ...]:
+        """What is in the hand: as it was found, if that is where it has been carried, else as carried."""
+        carried = self._carried(inquiry.things)
+        closer = Inquiry(self._search_part, inquiry.things)
+        alike = closer.alike(carried[0].T_query_support, whole[0].T_query_support)
+        return whole if alike and whole[0].score > carried[0].score else carried
 
     def _bent(self, inquiry: Inquiry, found: tuple[Hypothesis, ...]) -> tuple[Hypothesis, ...]:
         """Where what is next to the gripper is, if it points elsewhere than where it was found."""
         points = self._part.cloud.points
-        if len(points) < SMALLEST:
+        if len(points) < ENOUGH:
             return found
         goal = points[nearest(self._goal[None], points)[1][0, 0]]
         return Inquiry(self._search_part, inquiry.things, inquiry.hints).bent(found, goal)
