@@ -98,3 +98,18 @@ def test_the_motion_begun_is_kept_if_it_explains_about_as_much():
     assert begun.kept((elsewhere,)) == (elsewhere,)
     gone = inquiry([THERE], [np.eye(4)])
     assert gone.kept((turned,)) == (turned,)
+
+
+def test_what_bends_is_turned_about_where_it_ends():
+    turned = THERE @ at(0.0, 0.0, 0.0, yaw=1.2)
+    asked = inquiry([turned])
+    found = (asked.finished(T),)
+    best = asked.bent(found, HERE[:3, 3])[0]
+    assert best.score > 0.9 and found[0].score < 0.8
+    assert se3.translation_distance(best.T_query_support @ HERE, turned) < 0.01
+
+
+def test_what_is_explained_already_is_not_turned():
+    asked = inquiry([THERE])
+    found = (asked.finished(T),)
+    assert asked.bent(found, HERE[:3, 3]) == found

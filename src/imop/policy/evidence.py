@@ -241,7 +241,7 @@ class Judge:
         return Hypothesis(T_query_support, score, fine.points[good], p_query)
 
     def in_view(self, T_query_support: FloatArray) -> float:
-        """Share 0 .. 1 of the moved region, without its context, that is explained, but for what is hidden."""
+        """Share 0 .. 1 of the moved region, without context or what is hidden, that is explained."""
         size, weight = self._template.size, self._template.fine_weight[: self._template.size]
         own = moved(self._template.fine.select(np.arange(size)), T_query_support)
         assert own.normals is not None

@@ -158,7 +158,9 @@ class LearnedStep:
         """Where the whole region is, or the part of it that is next to the gripper."""
         sought, things = self._sought, inquiry.things
         if confirmed := inquiry.confirmed(sought.trusted(matches, fit)):
-            return confirmed if self._in_hand or confirmed[0].score > STIFF else self._bent(inquiry, confirmed)
+            return (
+                confirmed if self._in_hand or confirmed[0].score > STIFF else self._bent(inquiry, confirmed)
+            )
         whole = inquiry.search(np.concatenate([fit, sought.seeds(matches, things)]))
         if whole[0].score > BENT:
             return whole
