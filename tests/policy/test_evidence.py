@@ -77,6 +77,17 @@ def test_unseen_space_costs_less_than_empty_space():
     assert judged(region, half, np.eye(4), (camera(near),)) > judged(region, half, np.eye(4), (camera(far),))
 
 
+def test_in_view_counts_what_is_seen_to_be_gone_but_not_what_is_hidden():
+    region = box(SIZE, RED)
+    half = region.select(region.points[:, 0] < 0)
+    near, far = np.full((64, 64), 0.5, np.float32), np.full((64, 64), 9.0, np.float32)
+    covered, open_ = (
+        Judge(template(region), Surface(half, (camera(depth),))).in_view(np.eye(4)) for depth in (near, far)
+    )
+    # From above only the top of the missing half is seen to be gone: a sixth of what is explained.
+    assert covered > 0.95 and open_ == pytest.approx(1 / (1 + 1 / 5), abs=0.05)
+
+
 @pytest.mark.parametrize(
     ("point", "normal"),
     [((0, 0, 0), (0, 0, -1)), ((0, 0, 0), (1, 0, 0)), ((5.0, 0, 0), (0, 0, 1)), ((0, 0, 3.0), (0, 0, 1))],

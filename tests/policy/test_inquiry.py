@@ -113,3 +113,10 @@ def test_what_is_explained_already_is_not_turned():
     asked = inquiry([THERE])
     found = (asked.finished(T),)
     assert asked.bent(found, HERE[:3, 3]) == found
+
+
+def test_what_slipped_in_the_hand_is_found_beside_where_it_was_carried():
+    # The gripper is where it was in the demonstration.
+    slipped = inquiry([at(0.115, 0.092)], [np.eye(4)]).slipped()
+    assert slipped.T_query_support[:3, 3] == pytest.approx([0.015, -0.008, 0.0], abs=0.003)
+    assert slipped.score > 0.9

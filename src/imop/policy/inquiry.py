@@ -75,14 +75,15 @@ class Inquiry:
         if not likely:
             return ()
         hint, straight = likely
-        T = self.things.refine(self._search.coarse[-1], hint, CLOSE)
-        T = self.things.refine(self._search.fine, T, FINEST)
+        T = self._settled(hint, CLOSE)
         near = np.stack([T, upright(T, self._center), straight])
         different = near[distinct(near, self._center, len(near), *SAME_MOTION)]
         ordered = self._ordered([self._judge.judge(T) for T in different])
         best, sure = ordered[0], self._config.sure
+        if best.score >= sure:
+            return ordered
         seen = best.score >= MOSTLY and self._judge.in_view(best.T_query_support) >= sure
-        return ordered if best.score >= sure or seen else ()
+        return ordered if seen else ()
 
     def confirmed(self, trusted: FloatArray) -> tuple[Hypothesis, ...]:
         """The motions next to the best of trusted ones (H, 4, 4); none if it does not explain the scene."""
@@ -148,13 +149,13 @@ class Inquiry:
         What bends ends about where it would if it did not, but in another direction.
         """
         T = found[0].T_query_support
-        here, there = center[None], se3.apply(T, center[None])
-        ends = [self._settled(turn @ T) for turn in upright_motions(there[0], there, TURNS)]
-        ends = [end for T in ends for end in (T, upright(T, self._center))]
-        ends = [end for end in ends if np.linalg.norm(se3.apply(end, here) - there) < ELSEWHERE]
-        if not ends:
+        p_there = se3.apply(T, center[None])
+        settled = [self._settled(turn @ T, NEARBY) for turn in upright_motions(p_there[0], p_there, TURNS)]
+        ends = np.stack([end for motion in settled for end in (motion, upright(motion, self._center))])
+        ends = ends[self._near(ends, T, center)]
+        if not len(ends):
             return found
-        judged = self._judged(ends)
+        judged = self._judged(list(ends))
         turned = se3.rotation_distance(np.stack([h.T_query_support for h in judged]), T)
         best = judged[int(np.argmax([h.score for h in judged] - BENDING * turned / np.pi))]
         if self.finished(T).score >= NEARLY * best.score:
@@ -189,9 +190,9 @@ class Inquiry:
         glances = self._judge.glance(np.stack(motions))
         return [T for T, glance in zip(motions, glances, strict=True) if glance >= share * glances.max()]
 
-    def _settled(self, T: FloatArray) -> FloatArray:
-        """The motion next to `T`, which is near already."""
-        T = self.things.refine(self._search.coarse[-1], T, NEARBY)
+    def _settled(self, T: FloatArray, stages: tuple[float, ...]) -> FloatArray:
+        """The motion next to `T`, which is as near already as the first of the stages."""
+        T = self.things.refine(self._search.coarse[-1], T, stages)
         return self.things.refine(self._search.fine, T, FINEST)
 
     def _moved(self, T: FloatArray, part: int = -1) -> FloatArray:
@@ -215,9 +216,10 @@ class Inquiry:
         T_repeated[:3, 3] += (se3.apply(T, p) - se3.apply(T_repeated, p))[0]
         return T_repeated
 
-    def _near(self, motions: FloatArray, T: FloatArray) -> BoolArray:
-        """(H,) which motions carry the region about where `T` does."""
-        p_moved, p = se3.apply(motions, self._center[None])[:, 0], se3.apply(T, self._center[None])[0]
+    def _near(self, motions: FloatArray, T: FloatArray, center: FloatArray | None = None) -> BoolArray:
+        """(H,) which motions carry a point (3,), by default the region's middle, about where `T` does."""
+        here = (self._center if center is None else center)[None]
+        p_moved, p = se3.apply(motions, here)[:, 0], se3.apply(T, here)[0]
         near: BoolArray = np.linalg.norm(p_moved - p, axis=1) < ELSEWHERE
         return near
 

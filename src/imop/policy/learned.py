@@ -38,10 +38,10 @@ TIGHT = 0.015
 # where the whole is by this score, and about as well as the whole.
 BENT = 0.7
 NEXT_TO = 0.05
-# What is explained better than this does not bend.
-STIFF = 0.8
 CERTAIN, CONTRADICTED = 0.8, 0.9
 BETTER, AS_GOOD = 0.1, 0.85
+# What is explained better than this does not bend.
+STIFF = 0.8
 # A hand that is as wide open as it was shown, up to this share of its stroke, holds what it held.
 AS_WIDE = 0.04
 # What the hand takes is somewhere else than the region says only if it is explained there by this score.
@@ -131,7 +131,7 @@ class LearnedStep:
         found = inquiry.followed()
         if not found and self._in_hand and abs(query.observation.gripper_opening - self._opening) < AS_WIDE:
             slipped = inquiry.slipped()
-            return (slipped,) if slipped.score > BENT else self._carried(things)
+            return (slipped,) if slipped.score > BENT else self._in_the_hand(things).repeated()
         if found and self._taken is not None:
             taken = self._there(self._taken, things, found[0].T_query_support)
             return found if taken.score > BENT else ()
@@ -158,9 +158,7 @@ class LearnedStep:
         """Where the whole region is, or the part of it that is next to the gripper."""
         sought, things = self._sought, inquiry.things
         if confirmed := inquiry.confirmed(sought.trusted(matches, fit)):
-            return (
-                confirmed if self._in_hand or confirmed[0].score > STIFF else self._bent(inquiry, confirmed)
-            )
+            return self._bent(inquiry, confirmed)
         whole = inquiry.search(np.concatenate([fit, sought.seeds(matches, things)]))
         if whole[0].score > BENT:
             return whole
@@ -221,21 +219,21 @@ class LearnedStep:
         cloud = self._before.cloud
         return cloud.select(~self._before.ground.bare & ~within(cloud.points, region.cloud.points, SAME))
 
-    def _carried(self, things: Things) -> tuple[Hypothesis, ...]:
-        """What is in the hand has moved as the gripper has, whatever its colour."""
-        return Inquiry(self._search_part, things.colorless()).repeated()
+    def _in_the_hand(self, things: Things) -> Inquiry:
+        """About what is next to the gripper, whatever its colour: it has moved as the gripper has."""
+        return Inquiry(self._search_part, things.colorless())
 
     def _held(self, inquiry: Inquiry, whole: tuple[Hypothesis, ...]) -> tuple[Hypothesis, ...]:
         """What is in the hand: as it was found, if that is where it has been carried, else as carried."""
-        carried = self._carried(inquiry.things)
-        closer = Inquiry(self._search_part, inquiry.things)
+        closer = self._in_the_hand(inquiry.things)
+        carried = closer.repeated()
         alike = closer.alike(carried[0].T_query_support, whole[0].T_query_support)
         return whole if alike and whole[0].score > carried[0].score else carried
 
     def _bent(self, inquiry: Inquiry, found: tuple[Hypothesis, ...]) -> tuple[Hypothesis, ...]:
         """Where what is next to the gripper is, if it points elsewhere than where it was found."""
         points = self._part.cloud.points
-        if len(points) < ENOUGH:
+        if self._in_hand or found[0].score > STIFF or len(points) < ENOUGH:
             return found
         goal = points[nearest(self._goal[None], points)[1][0, 0]]
         return Inquiry(self._search_part, inquiry.things, inquiry.hints).bent(found, goal)
