@@ -231,9 +231,7 @@ def estimate_normals(
 
     Less than five points have no tangent planes: their normals point at the cameras.
     """
-    to_camera = viewpoints[cloud.camera] - cloud.points
-    to_camera /= np.maximum(se3.lengths(to_camera), 1e-12)[:, None]
-    normals = to_camera.copy()
+    normals = np.zeros_like(cloud.points)
     rough = np.arange(len(cloud)) if flat is None else np.flatnonzero(~flat)
     if flat is not None and flat.sum() >= 5:
         normals[flat] = fit_plane(cloud.points[flat])[1]
@@ -241,12 +239,24 @@ def estimate_normals(
         target = small_gicp.PointCloud(cloud.points[rough])
         # On one thread: waiting threads of its pool slow down all that comes after by more than they save.
         small_gicp.estimate_normals(target, num_neighbors=min(neighbours, len(rough)), num_threads=1)
-        found = np.asarray(target.normals())[:, :3]
-        defined = se3.lengths(found) > 0.5
-        normals[rough[defined]] = found[defined]
-    away = np.einsum("ij,ij->i", normals, to_camera) < 0
-    normals[away] *= -1
-    return PointCloud(cloud.points, cloud.colors, cloud.camera, normals, cloud.ids)
+        normals[rough] = target.normals()[:, :3]
+    return facing(cloud, normals, viewpoints)
+
+
+def facing(cloud: PointCloud, normals: FloatArray, viewpoints: FloatArray) -> PointCloud:
+    """The cloud with normals (N, 3), turned to its cameras; those of no length point at them.
+
+    Args:
+        cloud: the points.
+        normals: (N, 3) of length 1 or 0.
+        viewpoints: (C, 3) origins of the cameras, in the order that `cloud.camera` counts them.
+    """
+    to_camera = viewpoints[cloud.camera] - cloud.points
+    along = np.einsum("ij,ij->i", normals, to_camera)
+    turned = np.where(along < 0, -1.0, 1.0)[:, None] * normals
+    undefined = np.flatnonzero(se3.lengths(normals) < 0.5)
+    turned[undefined] = to_camera[undefined] / np.maximum(se3.lengths(to_camera[undefined]), 1e-12)[:, None]
+    return replace(cloud, normals=turned)
 
 
 def fit_plane(points: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -15,6 +15,8 @@ from imop.types import BoolArray, FloatArray, Observation
 WORKSPACE_LOWER = (-0.3, -0.5, 0.6)
 WORKSPACE_UPPER = (0.7, 0.5, 1.6)
 
+# The supporting plane has at least so many points, and leans by no more than this (radians).
+FEW, LEVEL = 50, 0.2
 # Points nearer than this to the supporting plane belong to it, metres.
 PLANE_THICKNESS = 0.008
 
@@ -58,7 +60,11 @@ class Perception:
     upper: tuple[float, float, float] = WORKSPACE_UPPER
 
     def __call__(self, observation: Observation) -> PointCloud:
-        """The scene around the robot, with normals.
+        """The scene around the robot, with normals; raises as `points` does."""
+        return with_normals(self.points(observation), observation)
+
+    def points(self, observation: Observation) -> PointCloud:
+        """The scene around the robot, without normals, which take a third of the time.
 
         Raises:
             InvalidInput: if no depth was measured, if nothing lies in the workspace, or if the self-filter
@@ -71,8 +77,6 @@ class Perception:
             accepted = f"points between {self.lower} and {self.upper} m, world frame"
             raise InvalidInput("views", "nothing is left in the workspace", accepted)
         cloud = clouds.voxel_downsample(cloud, self.voxel)
-        viewpoints = np.stack([view.T_world_camera[:3, 3] for view in observation.views.values()])
-        cloud = clouds.estimate_normals(cloud, viewpoints, flat=open_ground(cloud.points))
         return cloud.select(clouds.farthest_points(cloud.points, self.max_points))
 
     @staticmethod
@@ -83,12 +87,22 @@ class Perception:
         return robot_mask(cloud.points, observation.joint_positions, observation.gripper_opening)
 
 
-def supporting_plane(cloud: PointCloud, tilt: float = 0.2, bin_height: float = 0.005) -> Plane | None:
+def with_normals(cloud: PointCloud, observation: Observation, flat: BoolArray | None = None) -> PointCloud:
+    """The cloud of an observation with normals; (N,) `flat`: its `open_ground`, if it is known."""
+    flat = open_ground(cloud.points) if flat is None else flat
+    return clouds.estimate_normals(cloud, viewpoints(observation), flat=flat)
+
+
+def viewpoints(observation: Observation) -> FloatArray:
+    """(C, 3) where the cameras are, world frame."""
+    return np.stack([view.T_world_camera[:3, 3] for view in observation.views.values()])
+
+
+def supporting_plane(cloud: PointCloud, bin_height: float = 0.005) -> Plane | None:
     """The most populated near-horizontal plane of a cloud with normals, or None if there is none.
 
     Args:
         cloud: needs normals.
-        tilt: how far (radians) the normal of a point of the plane may lean from the vertical.
         bin_height: height of a slice when counting, metres.
 
     Raises:
@@ -96,8 +110,8 @@ def supporting_plane(cloud: PointCloud, tilt: float = 0.2, bin_height: float = 0
     """
     if cloud.normals is None:
         raise InvalidInput("cloud.normals", "missing", "a cloud from Perception or estimate_normals")
-    level = cloud.points[cloud.normals[:, 2] > np.cos(tilt)]
-    if len(level) < 50:
+    level = cloud.points[cloud.normals[:, 2] > np.cos(LEVEL)]
+    if len(level) < FEW:
         return None
     height = _most_populated(level[:, 2], bin_height)
     for reach in (2 * bin_height, bin_height):
@@ -108,7 +122,7 @@ def supporting_plane(cloud: PointCloud, tilt: float = 0.2, bin_height: float = 0
     if len(near) > 2:
         fitted = clouds.fit_plane(near)[1]
         fitted = fitted if fitted[2] > 0 else -fitted
-        normal = fitted if fitted[2] >= np.cos(tilt) else normal
+        normal = fitted if fitted[2] >= np.cos(LEVEL) else normal
     return Plane(normal, float(normal @ center))
 
 
@@ -119,12 +133,21 @@ def _most_populated(z: FloatArray, bin_height: float) -> float:
     return float((slices[np.argmax(counts)] + 0.5) * bin_height)
 
 
+def open_plane(points: FloatArray) -> Plane | None:
+    """The plane of `open_ground` points (N, 3), if there are enough of them and it is about level."""
+    if len(points) < FEW:
+        return None
+    center, normal = clouds.fit_plane(points)
+    normal = normal if normal[2] > 0 else -normal
+    return Plane(normal, float(normal @ center)) if normal[2] >= np.cos(LEVEL) else None
+
+
 def open_ground(points: FloatArray) -> BoolArray:
     """(N,) which points (N, 3) lie in the supporting plane, far from all that is not in it.
 
     Their normals need no search for neighbours, and most of a scene is bare table.
     """
-    if len(points) < 50:
+    if len(points) < FEW:
         return np.zeros(len(points), dtype=bool)
     x, y, z = points.T
     near = points[np.abs(z - _most_populated(z, PLANE_THICKNESS)) < PLANE_THICKNESS]
@@ -157,13 +180,17 @@ class Ground:
         return points[:, 2] - self.lowest if self.plane is None else self.plane.height(points)
 
 
-def find_ground(cloud: PointCloud) -> Ground:
-    """The bare ground of a cloud with normals, of at least one point.
+def find_ground(cloud: PointCloud, plane: Plane | None = None) -> Ground:
+    """The bare ground of a cloud of at least one point.
+
+    Args:
+        cloud: with normals, or
+        plane: the supporting plane, if it is known.
 
     Raises:
-        InvalidInput: if the cloud has no normals.
+        InvalidInput: if neither is there.
     """
-    plane, lowest = supporting_plane(cloud), float(cloud.points[:, 2].min())
+    plane, lowest = plane or supporting_plane(cloud), float(cloud.points[:, 2].min())
     if plane is None:
         return Ground(None, np.zeros(len(cloud), dtype=bool), lowest)
     bare = np.abs(plane.height(cloud.points)) < PLANE_THICKNESS

@@ -110,18 +110,16 @@ class LearnedStep:
 
     def match(self, query: Scene, hints: Sequence[FloatArray] = ()) -> tuple[Hypothesis, ...]:
         """Where the region is in the query, best first; see `PreparedStep.match`."""
-        if len(query.cloud) < 5:
+        if len(query.fused) < 5:
             return ()
-        standing = query.cloud.select(~query.ground.bare)
-        return self._followed(query, standing, hints) or self._searched(query, standing, hints)
+        return self._followed(query, hints) or self._searched(query, hints)
 
-    def _followed(
-        self, query: Scene, standing: PointCloud, hints: Sequence[FloatArray]
-    ) -> tuple[Hypothesis, ...]:
+    def _followed(self, query: Scene, hints: Sequence[FloatArray]) -> tuple[Hypothesis, ...]:
         """Where the region is if it has moved as what was acted on before; no network need be asked."""
         if not hints:
             return ()
         search = self._sought.search
+        standing = query.fused.select(~query.ground.bare)
         near = standing.select(search.around(standing.points, search.likely(query, hints)))
         near = without_held(near, query, self._sought.region)
         if len(near) < SMALLEST:
@@ -137,10 +135,9 @@ class LearnedStep:
             return found if taken.score > BENT else ()
         return found
 
-    def _searched(
-        self, query: Scene, standing: PointCloud, hints: Sequence[FloatArray]
-    ) -> tuple[Hypothesis, ...]:
+    def _searched(self, query: Scene, hints: Sequence[FloatArray]) -> tuple[Hypothesis, ...]:
         """Where the networks and what was seen say that the region is."""
+        standing = query.cloud.select(~query.ground.bare)
         standing = without_held(standing, query, self._sought.region)
         if len(standing) < SMALLEST:
             return ()

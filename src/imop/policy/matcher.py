@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imop.geometry.cloud import PointCloud
-from imop.geometry.perception import Ground, find_ground
-from imop.types import Action, FloatArray, Observation
+from imop.geometry.perception import Ground, find_ground, open_ground, open_plane, with_normals
+from imop.types import Action, BoolArray, FloatArray, Observation
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,16 +24,29 @@ class Scene:
 
     Attributes:
         observation: the images, whose depth also says where nothing is, and the pose of the gripper.
-        cloud: the prepared cloud with normals, without the robot.
+        fused: the prepared cloud without the robot; it may be without normals.
     """
 
     observation: Observation
-    cloud: PointCloud
+    fused: PointCloud
+
+    @cached_property
+    def _open(self) -> BoolArray:
+        """(N,) which points are open ground."""
+        return open_ground(self.fused.points)
+
+    @cached_property
+    def cloud(self) -> PointCloud:
+        """The same points with normals; estimated once, for what needs them all."""
+        if self.fused.normals is not None:
+            return self.fused
+        return with_normals(self.fused, self.observation, self._open)
 
     @cached_property
     def ground(self) -> Ground:
-        """What of the cloud is bare ground; found once."""
-        return find_ground(self.cloud)
+        """What of the cloud is bare ground; found once, without normals if much of it lies open."""
+        plane = open_plane(self.fused.points[self._open])
+        return find_ground(self.fused, plane) if plane else find_ground(self.cloud)
 
 
 @dataclass(frozen=True, eq=False)

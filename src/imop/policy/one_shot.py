@@ -141,7 +141,7 @@ class OneShotPolicy:
         return next(able, hypotheses[0])
 
     def _scene(self, observation: Observation) -> Scene:
-        return Scene(observation, self._perception(observation))
+        return Scene(observation, self._perception.points(observation))
 
 
 def _orthonormal(T: FloatArray) -> FloatArray:

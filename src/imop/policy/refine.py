@@ -30,6 +30,11 @@ class Refiner:
         self._tree = small_gicp.KdTree(self._target)
         small_gicp.estimate_normals(self._target, self._tree, num_neighbors=12)
 
+    @property
+    def normals(self) -> FloatArray:
+        """(N, 3) of the observed points, either way round; of no length where there is no tangent plane."""
+        return np.asarray(self._target.normals())[:, :3]
+
     def __call__(
         self, region: FloatArray, T: FloatArray, stages: tuple[float, ...] = STAGES, iterations: int = 20
     ) -> FloatArray:

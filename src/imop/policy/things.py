@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud
+from imop.geometry.cloud import PointCloud, facing
 from imop.geometry.neighbours import nearest, within
+from imop.geometry.perception import viewpoints
 from imop.policy.contacts import SAME
 from imop.policy.evidence import Surface, shades
 from imop.policy.matcher import Scene
@@ -28,15 +29,17 @@ class Things:
 
     Attributes:
         query: the observed scene.
-        cloud: at least 5 points of it, all that the region may be.
+        cloud: at least 5 points of it, all that the region may be; with normals, if need be of these alone.
         surface: the same as evidence.
         refine: lays regions onto them.
     """
 
     def __init__(self, query: Scene, cloud: PointCloud) -> None:
-        self.query, self.cloud = query, cloud
+        self.query, self.refine = query, Refiner(cloud.points)
+        if cloud.normals is None:
+            cloud = facing(cloud, self.refine.normals, viewpoints(query.observation))
+        self.cloud = cloud
         self.surface = Surface(cloud, tuple(query.observation.views.values()))
-        self.refine = Refiner(cloud.points)
 
     @cached_property
     def labels(self) -> NDArray[np.int64]:
