@@ -140,3 +140,11 @@ def test_few_points_get_normals_towards_the_camera(rng, count):
     found = clouds.estimate_normals(random_cloud(rng, count), np.array([[0, 0, 10.0]]))
     assert found.normals.shape == (count, 3)
     assert np.all(found.normals[:, 2] > 0.9)
+
+
+def test_normals_are_turned_to_the_camera_that_saw_the_point():
+    points = np.array([[0.0, 0, 1], [0, 0, 1], [0, 0, 1]])
+    cloud = clouds.PointCloud(points, np.zeros((3, 3), np.float32), np.array([0, 1, 1], np.int32))
+    up = np.array([[0.0, 0, 1], [0, 0, 1], [0, 0, 0]])
+    found = clouds.facing(cloud, up, np.array([[0, 0, 5.0], [3, 0, -3]])).normals
+    np.testing.assert_allclose(found, [[0, 0, 1], [0, 0, -1], [0.6, 0, -0.8]])

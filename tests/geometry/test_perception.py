@@ -6,7 +6,7 @@ import pytest
 from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, estimate_normals, fuse
-from imop.geometry.perception import Perception, find_ground, open_ground, supporting_plane
+from imop.geometry.perception import Perception, find_ground, open_ground, open_plane, supporting_plane
 from tests.geometry.test_cloud import flat_view, observation
 
 
@@ -141,3 +141,28 @@ def test_normals_of_open_ground_are_those_of_the_search():
     away = np.abs(points[:, :2]).max(axis=1) > 0.05
     np.testing.assert_allclose(known[away], searched[away], atol=1e-3)
     np.testing.assert_allclose(known[box], searched[box], atol=1e-9)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.05, -0.1])
+def test_the_open_plane_is_the_table(tilt):
+    points, box = table_points(tilt, noise=0.0005)
+    plane = open_plane(points[~box])
+    assert np.abs(plane.height(points[~box])).max() < 0.003
+    assert plane.normal[2] > 0 and np.all(plane.height(points[box]) > 0.003)
+
+
+def test_what_is_steep_or_next_to_nothing_is_no_open_plane():
+    points, _ = table_points()
+    assert open_plane(points[:, [2, 1, 0]]) is None
+    assert open_plane(points[:20]) is None
+
+
+def test_ground_needs_normals_or_a_plane():
+    cloud = Perception().points(table_with_box())
+    assert cloud.normals is None
+    with pytest.raises(InvalidInput, match="normals"):
+        find_ground(cloud)
+    with_normals = Perception()(table_with_box())
+    np.testing.assert_array_equal(cloud.points, with_normals.points)
+    plane = open_plane(cloud.points[open_ground(cloud.points)])
+    np.testing.assert_array_equal(find_ground(cloud, plane).bare, find_ground(with_normals).bare)

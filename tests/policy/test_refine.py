@@ -37,3 +37,9 @@ def test_upright_keeps_turn_and_place_and_removes_tilt(yaw, rng):
     np.testing.assert_allclose(flat[2, :3], (0, 0, 1), atol=1e-12)
     np.testing.assert_allclose(se3.apply(flat, center[None]), se3.apply(T, center[None]), atol=1e-12)
     assert np.isclose(np.exp(1j * yaw), np.exp(1j * np.arctan2(flat[1, 0], flat[0, 0])), atol=0.02)
+
+
+def test_normals_stand_on_the_faces_of_a_box():
+    thing = box((0.08, 0.05, 0.06), RED)
+    upright_to = np.abs(np.einsum("ij,ij->i", Refiner(thing.points).normals, thing.normals))
+    assert np.quantile(upright_to, 0.3) > 0.99

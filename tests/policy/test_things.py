@@ -1,5 +1,7 @@
 """What a region may be: connected things, without what is in the hand."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from imop.geometry import se3
@@ -62,3 +64,13 @@ def test_colours_are_found_again_and_can_be_left_out():
     assert things.colored_like(blue).tolist() == [False] * len(red) + [True] * len(blue)
     assert not things.colored_like(blue.select(np.arange(0))).any()
     assert things.colorless().colored_like(red.colorless()).all()
+
+
+def test_things_without_normals_get_them_from_their_own_points():
+    cube = box((0.08, 0.08, 0.08), RED, at(0.1, 0.1), spacing=0.003)
+    found = Things(scene([], HOME), replace(cube, normals=None)).cloud
+    np.testing.assert_array_equal(found.points, cube.points)
+    # Those of the sides may point either way for a camera straight above.
+    assert np.quantile(np.abs(np.einsum("ij,ij->i", found.normals, cube.normals)), 0.2) > 0.99
+    assert np.all(np.einsum("ij,ij->i", found.normals, np.array([0, 0, 2]) - found.points) >= 0)
+    assert Things(scene([], HOME), cube).cloud is cube
