@@ -15,7 +15,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -23,41 +23,27 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from imop.errors import ImopError, NoConfidentMatch
-from imop.evaluation.cases import recorded_cases, simulated_cases
+from imop.errors import ImopError, InvalidInput, NoConfidentMatch
+from imop.evaluation.cases import CaseOptions
 from imop.evaluation.open_loop import Case, ToldRouter
-from imop.evaluation.trials import make_policy, suite_trials
-from imop.files import replaced, user_cache
+from imop.evaluation.trials import make_policy
+from imop.files import replaced
 from imop.policy.one_shot import OneShotPolicy
 from imop.tasks.expert import ExpertFailed
 from imop.tasks.layout import NoRoom
 
 
 @dataclass
-class Options:
+class Options(CaseOptions):
     """Settings of the benchmark.
 
     Attributes:
-        suite: of the simulated tasks.
-        split: which of its tasks.
-        tasks: comma-separated names within the suite; all of the split by default.
-        demos: a folder in RLBench's layout instead of a suite.
         methods: comma-separated; ratios are to the last one.
-        scenes: per task, with its variations in turn.
-        seed: of the first scene.
         json: where the results and every single time go.
-        cache: where recorded scenes are kept.
     """
 
-    suite: str = "tabletop"
-    split: str = "all"
-    tasks: str = ""
-    demos: Path | None = None
     methods: str = "learned,registration"
-    scenes: int = 3
-    seed: int = 0
     json: Path | None = None
-    cache: Path = field(default_factory=user_cache)
 
 
 @dataclass(frozen=True)
@@ -83,7 +69,8 @@ def decisions(case: Case, methods: list[str]) -> Iterator[Times]:
     policies: dict[str, tuple[OneShotPolicy, ToldRouter]] = {}
     for method in methods:
         policy = make_policy(method)
-        assert isinstance(policy, OneShotPolicy)
+        if not isinstance(policy, OneShotPolicy):
+            raise InvalidInput("methods", method, "methods that look at images")
         policy.router = told = ToldRouter(policy.router)
         policy.watch(shown.stripped())
         policies[method] = policy, told
@@ -134,11 +121,8 @@ def measure(options: Options) -> list[Times]:
     Raises:
         ImopError: for options that do not fit, or recordings that cannot be used.
     """
-    tasks = tuple(filter(None, options.tasks.split(",")))
-    trials = suite_trials(options.suite, options.split, tasks, options.scenes, options.seed, 0)
-    cases = recorded_cases(options.demos) if options.demos else simulated_cases(trials, options.cache)
     rows = []
-    for make_case in cases:
+    for make_case in options.cases():
         try:
             case = make_case()
         except (ExpertFailed, NoRoom) as error:

@@ -15,7 +15,7 @@ import shlex
 import sys
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,14 +27,14 @@ from rich.table import Table
 
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.benchmark import parallel
-from imop.evaluation.cases import recorded_cases, simulated_cases
+from imop.evaluation.cases import CaseOptions
 from imop.evaluation.open_loop import Case, RecordedPoses, ask
 from imop.evaluation.open_loop_rows import Row, by_task
 from imop.evaluation.oracle import OraclePolicy
 from imop.evaluation.picture import Panel, save_picture
 from imop.evaluation.rollout import Policy
-from imop.evaluation.trials import make_policy, suite_trials
-from imop.files import replaced, user_cache
+from imop.evaluation.trials import make_policy
+from imop.files import replaced
 from imop.geometry.accuracy import COARSE
 from imop.tasks.expert import ExpertFailed
 from imop.tasks.layout import NoRoom
@@ -42,38 +42,22 @@ from imop.types import Action
 
 
 @dataclass
-class Options:
+class Options(CaseOptions):
     """Settings of the benchmark.
 
     Attributes:
-        suite: of the simulated tasks.
-        split: which of its tasks.
-        tasks: comma-separated names within the suite; all of the split by default.
-        demos: a folder in RLBench's layout instead of a suite: an episode, a task, or several tasks.
         methods: comma-separated: learned, registration, textbook (FPFH, RANSAC and ICP of Open3D, extra
             baselines), replay, oracle. By default all that need no extra, but no oracle on
             recordings, which do not tell where objects are.
-        scenes: per task, with its variations in turn.
-        seed: of the first scene.
-        instance: seed of the objects.
         json: where the results and every single prediction go.
         pictures: folder for pictures of what the first method fails at.
-        cache: where recorded scenes are kept.
         steps: also show every step of every task.
         jobs: processes.
     """
 
-    suite: str = "tabletop"
-    split: str = "all"
-    tasks: str = ""
-    demos: Path | None = None
     methods: str = ""
-    scenes: int = 3
-    seed: int = 0
-    instance: int = 0
     json: Path | None = None
     pictures: Path | None = None
-    cache: Path = field(default_factory=user_cache)
     steps: bool = False
     jobs: int = 1
 
@@ -162,12 +146,7 @@ def measure(options: Options, console: Console) -> dict[str, dict[str, Any]]:
         raise InvalidInput("methods", "oracle", "methods that need no object poses, for recordings")
     for method in methods:
         policy_of(method, RecordedPoses())
-    tasks = tuple(filter(None, options.tasks.split(",")))
-    trials = suite_trials(options.suite, options.split, tasks, options.scenes, options.seed, options.instance)
-    cases = recorded_cases(options.demos) if options.demos else simulated_cases(trials, options.cache)
-    if not cases:
-        raise InvalidInput("demos", f"{options.demos}", "at least two episodes of one task and variation")
-    work = [delayed(evaluate)(case, methods, options.pictures) for case in cases]
+    work = [delayed(evaluate)(case, methods, options.pictures) for case in options.cases()]
     rows = [row for some in parallel(work, options.jobs, console, "demonstrations") for row in some]
     mine = {method: [row for row in rows if row.method == method] for method in methods}
     return {

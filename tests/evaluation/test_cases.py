@@ -1,7 +1,7 @@
 import pytest
 
-from imop.errors import InvalidInput
-from imop.evaluation.cases import recorded_cases, simulated_cases
+from imop.errors import ImopError, InvalidInput
+from imop.evaluation.cases import CaseOptions, recorded_cases, simulated_cases
 from imop.evaluation.trials import Trial, suite_trials
 
 
@@ -16,3 +16,17 @@ def test_one_case_for_each_task_and_variation(tmp_path):
 def test_a_folder_without_episodes_has_no_cases(tmp_path):
     with pytest.raises(InvalidInput):
         recorded_cases(tmp_path)
+
+
+def test_options_say_which_cases(tmp_path):
+    few = CaseOptions(tasks="press_buttons,stack_cubes", scenes=2, cache=tmp_path)
+    assert len(few.cases()) == sum(len({t.variation for t in trials}) for trials in asked(few).values())
+    with pytest.raises(ImopError, match="task"):
+        CaseOptions(tasks="fly", cache=tmp_path).cases()
+    with pytest.raises(InvalidInput):
+        CaseOptions(demos=tmp_path).cases()
+
+
+def asked(options):
+    tasks = tuple(options.tasks.split(","))
+    return suite_trials(options.suite, options.split, tasks, options.scenes, options.seed, options.instance)

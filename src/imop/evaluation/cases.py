@@ -1,14 +1,57 @@
 """What open-loop benchmarks ask for: a demonstration, and recorded scenes of its task and variation."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
 from imop.demos.rlbench import episodes, read_episode
+from imop.errors import InvalidInput
 from imop.evaluation.appearance import Appearance
 from imop.evaluation.open_loop import Case
 from imop.evaluation.recordings import Recordings, objects_world
-from imop.evaluation.trials import Trial
+from imop.evaluation.trials import Trial, suite_trials
+from imop.files import user_cache
+
+
+@dataclass
+class CaseOptions:
+    """Which demonstrations and scenes a benchmark asks for.
+
+    Attributes:
+        suite: of the simulated tasks.
+        split: which of its tasks.
+        tasks: comma-separated names within the suite; all of the split by default.
+        demos: a folder in RLBench's layout instead of a suite: an episode, a task, or several tasks.
+        scenes: per task, with its variations in turn.
+        seed: of the first scene.
+        instance: seed of the objects.
+        cache: where recorded scenes are kept.
+    """
+
+    suite: str = "tabletop"
+    split: str = "all"
+    tasks: str = ""
+    demos: Path | None = None
+    scenes: int = 3
+    seed: int = 0
+    instance: int = 0
+    cache: Path = field(default_factory=user_cache)
+
+    def cases(self) -> list[Callable[[], Case]]:
+        """One case for each demonstration, made when it is called; see `simulated_cases`.
+
+        Raises:
+            ImopError: for a suite, split or task that there is not, or recordings that cannot be used.
+        """
+        if self.demos is None:
+            tasks = tuple(filter(None, self.tasks.split(",")))
+            trials = suite_trials(self.suite, self.split, tasks, self.scenes, self.seed, self.instance)
+            return simulated_cases(trials, self.cache)
+        cases = recorded_cases(self.demos)
+        if not cases:
+            raise InvalidInput("demos", f"{self.demos}", "at least two episodes of one task and variation")
+        return cases
 
 
 def recorded_cases(demos: Path) -> list[Callable[[], Case]]:
