@@ -105,8 +105,8 @@ def transitions(take: Take, observations: list[Observation]) -> list[Transition]
 
 
 def plain(take: Take, k: int) -> PointCloud:
-    """The cloud of a state without the ids that only the truth needs."""
-    return replace(take.clouds[k], ids=None)
+    """The cloud of a state as the policy begins with it, without normals and what only the truth needs."""
+    return replace(take.clouds[k], ids=None, normals=None)
 
 
 def predict(
