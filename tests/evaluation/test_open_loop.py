@@ -13,6 +13,7 @@ from imop.evaluation.trials import Trial
 from imop.geometry import cloud as clouds
 from imop.geometry import se3
 from imop.geometry.accuracy import COARSE, FINE
+from imop.geometry.perception import Perception
 from imop.policy.baselines import ReplayPolicy
 from imop.policy.matcher import Hypothesis
 from imop.policy.one_shot import OneShotPolicy
@@ -117,7 +118,7 @@ class AlwaysFirst:
 
 def one_shot(router=None, until=100):
     # A cloud of one view is quickly made.
-    return OneShotPolicy(Everywhere(until), lambda observation: clouds.fuse(observation).select([0]), router)
+    return OneShotPolicy(Everywhere(until), Perception(max_points=1), router)
 
 
 def test_the_policy_is_asked_for_the_same_step_whatever_its_router_says(case):
