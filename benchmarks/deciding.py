@@ -24,13 +24,11 @@ from rich.console import Console
 from rich.table import Table
 
 from imop.errors import ImopError, InvalidInput, NoConfidentMatch
-from imop.evaluation.cases import CaseOptions
+from imop.evaluation.cases import CaseOptions, made
 from imop.evaluation.open_loop import Case, ToldRouter
 from imop.evaluation.trials import make_policy
 from imop.files import replaced
 from imop.policy.one_shot import OneShotPolicy
-from imop.tasks.expert import ExpertFailed
-from imop.tasks.layout import NoRoom
 
 
 @dataclass
@@ -123,12 +121,8 @@ def measure(options: Options) -> list[Times]:
     """
     rows = []
     for make_case in options.cases():
-        try:
-            case = make_case()
-        except (ExpertFailed, NoRoom) as error:
-            print(f"left out: {error}", file=sys.stderr)
-            continue
-        rows += list(decisions(case, options.methods.split(",")))
+        if case := made(make_case):
+            rows += list(decisions(case, options.methods.split(",")))
     return rows
 
 

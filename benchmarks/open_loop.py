@@ -27,7 +27,7 @@ from rich.table import Table
 
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.benchmark import parallel
-from imop.evaluation.cases import CaseOptions
+from imop.evaluation.cases import CaseOptions, made
 from imop.evaluation.open_loop import Case, RecordedPoses, ask
 from imop.evaluation.open_loop_rows import Row, by_task
 from imop.evaluation.oracle import OraclePolicy
@@ -36,8 +36,6 @@ from imop.evaluation.rollout import Policy
 from imop.evaluation.trials import make_policy
 from imop.files import replaced
 from imop.geometry.accuracy import COARSE
-from imop.tasks.expert import ExpertFailed
-from imop.tasks.layout import NoRoom
 from imop.types import Action
 
 
@@ -68,10 +66,8 @@ def policy_of(method: str, poses: RecordedPoses) -> Policy:
 
 def evaluate(make_case: Callable[[], Case], methods: Iterable[str], pictures: Path | None) -> list[Row]:
     """Rows of all methods; pictures are made of what the first one fails at."""
-    try:
-        case = make_case()
-    except (ExpertFailed, NoRoom) as error:
-        print(f"left out: {error}", file=sys.stderr)
+    case = made(make_case)
+    if case is None:
         return []
     rows = []
     for number, method in enumerate(methods):

@@ -1,8 +1,9 @@
 import pytest
 
 from imop.errors import ImopError, InvalidInput
-from imop.evaluation.cases import CaseOptions, recorded_cases, simulated_cases
+from imop.evaluation.cases import CaseOptions, made, recorded_cases, simulated_cases
 from imop.evaluation.trials import Trial, suite_trials
+from imop.tasks.expert import ExpertFailed
 
 
 def test_one_case_for_each_task_and_variation(tmp_path):
@@ -30,3 +31,13 @@ def test_options_say_which_cases(tmp_path):
 def asked(options):
     tasks = tuple(options.tasks.split(","))
     return suite_trials(options.suite, options.split, tasks, options.scenes, options.seed, options.instance)
+
+
+def test_a_case_without_a_demonstration_is_left_out_and_said(capsys):
+    def fails():
+        raise ExpertFailed("stack_cubes", 2, "no grasp")
+
+    assert made(fails) is None
+    assert "left out: stack_cubes: the expert failed at step 2" in capsys.readouterr().err
+    whole = object()
+    assert made(lambda: whole) is whole

@@ -1,5 +1,6 @@
 """What open-loop benchmarks ask for: a demonstration, and recorded scenes of its task and variation."""
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -12,6 +13,8 @@ from imop.evaluation.open_loop import Case
 from imop.evaluation.recordings import Recordings, objects_world
 from imop.evaluation.trials import Trial, suite_trials
 from imop.files import user_cache
+from imop.tasks.expert import ExpertFailed
+from imop.tasks.layout import NoRoom
 
 
 @dataclass
@@ -52,6 +55,15 @@ class CaseOptions:
         if not cases:
             raise InvalidInput("demos", f"{self.demos}", "at least two episodes of one task and variation")
         return cases
+
+
+def made(make_case: Callable[[], Case]) -> Case | None:
+    """The case, or None, with a line on standard error, if there is no demonstration for it."""
+    try:
+        return make_case()
+    except (ExpertFailed, NoRoom) as error:
+        print(f"left out: {error}", file=sys.stderr)
+        return None
 
 
 def recorded_cases(demos: Path) -> list[Callable[[], Case]]:

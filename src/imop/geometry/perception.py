@@ -117,13 +117,9 @@ def supporting_plane(cloud: PointCloud, bin_height: float = 0.005) -> Plane | No
     for reach in (2 * bin_height, bin_height):
         near = level[np.abs(level[:, 2] - height) < reach]
         height = float(near[:, 2].mean())
-    center, normal = near.mean(axis=0), np.array([0.0, 0.0, 1.0])
     # Two points, or a thin strip, determine no tilt; a table is level.
-    if len(near) > 2:
-        fitted = clouds.fit_plane(near)[1]
-        fitted = fitted if fitted[2] > 0 else -fitted
-        normal = fitted if fitted[2] >= np.cos(LEVEL) else normal
-    return Plane(normal, float(normal @ center))
+    fitted = _level_plane(near) if len(near) > 2 else None
+    return fitted or Plane(np.array([0.0, 0.0, 1.0]), float(near[:, 2].mean()))
 
 
 def _most_populated(z: FloatArray, bin_height: float) -> float:
@@ -135,8 +131,11 @@ def _most_populated(z: FloatArray, bin_height: float) -> float:
 
 def open_plane(points: FloatArray) -> Plane | None:
     """The plane of `open_ground` points (N, 3), if there are enough of them and it is about level."""
-    if len(points) < FEW:
-        return None
+    return _level_plane(points) if len(points) >= FEW else None
+
+
+def _level_plane(points: FloatArray) -> Plane | None:
+    """The plane nearest to points (N, 3), N > 2, if it is about level."""
     center, normal = clouds.fit_plane(points)
     normal = normal if normal[2] > 0 else -normal
     return Plane(normal, float(normal @ center)) if normal[2] >= np.cos(LEVEL) else None
