@@ -1,25 +1,48 @@
 """A robot arm learns a manipulation task from one demonstration, without retraining.
 
-Exit codes: 0 done, 1 the task failed or the data have errors, 2 bad input.
+Exit codes: 0 done, 1 the task failed or the data have errors, 2 bad input or a file that cannot be used.
 """
 
+import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 import tyro
 from rich.console import Console
+from rich.markup import escape
+from rich.status import Status
+from rich.text import Text
 from tyro.conf import Positional
 
 from imop.errors import ImopError
+from imop.files import writable_folder
 from imop.training.ablation import Ablation
 from imop.training.config import TrainConfig
 
 # Verbs import what they need when they run, so that --help does not wait for torch and MuJoCo.
 
 app = tyro.extras.SubcommandApp()
-console = Console()
+# Names and messages may hold brackets and colons, which must be shown as they are.
+console = Console(markup=False, emoji=False, highlight=False)
+T = TypeVar("T")
+
+
+def _track(these: Sequence[T], doing: str) -> Iterable[T]:
+    """The same, with progress while they are worked on."""
+    from rich.progress import track
+
+    return track(these, escape(doing), console=console, transient=True)
+
+
+def _status(doing: str) -> Status:
+    return console.status(Text(doing))
+
+
+def _list(folder: Path) -> None:
+    for path in sorted(folder.iterdir()):
+        console.print(f"  {path}", soft_wrap=True)
 
 
 @app.command
@@ -29,6 +52,7 @@ def run(
     variation: int = 0,
     instance: int = 0,
     demo: Path | None = None,
+    demo_episode: int = 0,
     method: Literal["learned", "routed", "replay", "registration", "oracle"] = "learned",
     weights: Path | None = None,
     min_confidence: float = 0.0,
@@ -44,27 +68,30 @@ def run(
         seed: scene to perform the task in.
         variation: which variation of the task.
         instance: seed of the objects' shapes, sizes and colours.
-        demo: folder with a recorded demonstration, its first episode; records one if not given.
+        demo: store or folder of RLBench's layout with a demonstration; one is recorded if not given.
+        demo_episode: which of its episodes.
         method: how poses are carried over from the demonstration.
         weights: folder that `imop train` wrote; by default the bundled weights.
         min_confidence: stop instead of acting below this confidence, 0 to 1.
         video: whether to draw rollout.mp4, which takes longer than the task itself.
         out: folder for the results.
     """
-    from imop.demos.load import load_demonstrations
+    from imop.demos.load import load_demonstration
     from imop.evaluation.run import perform, steps_table
     from imop.evaluation.trials import Trial, demonstration_for
 
+    writable_folder(out)
     trial = Trial(task, seed, variation, instance)
-    with console.status(f"recording one demonstration of {task}" if demo is None else f"reading {demo}"):
-        shown = demonstration_for(trial) if demo is None else load_demonstrations(demo, 1)[0]
-    with console.status(f"performing {task} in scene {seed}"):
+    with _status(f"recording one demonstration of {task}" if demo is None else f"reading {demo}"):
+        shown = demonstration_for(trial) if demo is None else load_demonstration(demo, demo_episode)
+    with _status(f"performing {task} in scene {seed}"):
         result = perform(trial, shown, method, out, min_confidence, video, weights)
     console.print(steps_table(result))
-    verdict = "[green]success[/]" if result.success else f"[red]failed[/]: {result.reason}"
-    console.print(f"{task}, scene {seed}: {verdict}")
-    for path in sorted(out.iterdir()):
-        console.print(f"  {path}", highlight=False)
+    console.print(
+        f"{task}, scene {seed}: {'success' if result.success else f'failed: {result.reason}'}",
+        style="green" if result.success else "red",
+    )
+    _list(out)
     return 0 if result.success else 1
 
 
@@ -108,7 +135,7 @@ def collect(
     console.print(f"{total} demonstrations in {out}, {done.recorded} of them new in {done.seconds:.0f} s")
     console.print(f"{failed} expert attempts failed and were repeated with another seed")
     for what in done.given_up:
-        console.print(f"[red]given up[/]: {what}")
+        console.print(f"given up: {what}", style="red")
     return 1 if done.given_up else 0
 
 
@@ -147,13 +174,14 @@ def evaluate(
     """
     from imop.evaluation.benchmark import evaluate_suite
 
+    writable_folder(out)
     log = out / "episodes.jsonl"
     results = evaluate_suite(
         suite, split, tasks, methods.split(","), episodes, seed, instance, jobs, console, log, weights
     )
     results.save(out)
     console.print(results.table())
-    console.print(f"{out / 'report.md'}\n{out / 'results.json'}", highlight=False)
+    console.print(f"{out / 'report.md'}\n{out / 'results.json'}")
     return 0
 
 
@@ -166,13 +194,9 @@ def import_(layout: Positional[Literal["rlbench"]], source: Positional[Path], ou
         source: an episode, a task folder, or a folder of task folders.
         out: folder of the store; an existing one is appended to.
     """
-    from rich.progress import track
-
     from imop.demos.rlbench import import_rlbench
 
-    count = import_rlbench(
-        source, out, track=lambda these: track(these, f"importing {source}", transient=True)
-    )
+    count = import_rlbench(source, out, track=lambda these: _track(these, f"importing {source}"))
     console.print(f"{count} demonstrations imported into {out}")
     return 0
 
@@ -186,15 +210,11 @@ def export(layout: Positional[Literal["rlbench"]], store: Positional[Path], out:
         store: the store.
         out: a new folder, which gets one folder per task.
     """
-    from rich.progress import track
-
     from imop.demos.export import export_rlbench
     from imop.demos.store import DemonstrationStore
 
-    def shown(numbers: range) -> Iterable[int]:
-        return track(numbers, f"exporting {store}", console=console, transient=True)
-
-    count = export_rlbench(DemonstrationStore.open(store), out, shown)
+    stored = DemonstrationStore.open(store)
+    count = export_rlbench(stored, out, lambda numbers: _track(numbers, f"exporting {store}"))
     console.print(f"{count} demonstrations exported into {out}")
     return 0
 
@@ -206,16 +226,12 @@ def check(path: Positional[Path]) -> int:
     Args:
         path: a store, or a folder in RLBench's layout.
     """
-    from rich.progress import track
-
     from imop.demos.check import check as find
     from imop.sim.robot import tip_pose
 
-    findings = find(
-        path, tip_pose=tip_pose, track=lambda these: track(these, f"checking {path}", transient=True)
-    )
+    findings = find(path, tip_pose=tip_pose, track=lambda these: _track(these, f"checking {path}"))
     for finding in findings:
-        console.print(str(finding), highlight=False)
+        console.print(str(finding))
     errors = sum(finding.severity == "error" for finding in findings)
     console.print(f"{path}: {errors} errors, {len(findings) - errors} warnings")
     return 1 if errors else 0
@@ -225,6 +241,8 @@ def check(path: Positional[Path]) -> int:
 def predict(
     demo: Path,
     query: Path,
+    demo_episode: int = 0,
+    query_episode: int = 0,
     method: Literal["learned", "replay", "registration"] = "learned",
     weights: Path | None = None,
     out: Path = Path("runs/predict"),
@@ -234,21 +252,23 @@ def predict(
     Writes result.json and steps.png.
 
     Args:
-        demo: the demonstration: a store or an RLBench episode, its first episode.
-        query: the recorded episode to predict, likewise.
+        demo: store or folder of RLBench's layout with the demonstration.
+        query: store or folder with the recorded episode to predict.
+        demo_episode: number of the demonstration's episode.
+        query_episode: number of the episode to predict.
         method: how poses are carried over from the demonstration.
         weights: folder that `imop train` wrote; by default the bundled weights.
         out: folder for the results.
     """
-    from imop.demos.load import load_demonstrations
+    from imop.demos.load import load_demonstration
     from imop.evaluation.run import predict_recorded, predictions_table
 
-    shown, recorded = (load_demonstrations(path, 1)[0] for path in (demo, query))
-    with console.status(f"predicting {query}"):
+    writable_folder(out)
+    shown, recorded = load_demonstration(demo, demo_episode), load_demonstration(query, query_episode)
+    with _status(f"predicting {query}"):
         predictions = predict_recorded(shown, recorded, method, out, weights)
     console.print(predictions_table(predictions))
-    for path in sorted(out.iterdir()):
-        console.print(f"  {path}", highlight=False)
+    _list(out)
     return 0
 
 
@@ -272,8 +292,9 @@ def tasks(
 
     console.print(tasks_table(chosen_tasks(suite, split, available=False), suite))
     if contact_sheet is not None:
+        writable_folder(contact_sheet.parent, "contact-sheet")
         save_contact_sheet(chosen_tasks(suite, split), contact_sheet, jobs, console)
-        console.print(contact_sheet, highlight=False)
+        console.print(contact_sheet)
     return 0
 
 
@@ -289,16 +310,16 @@ def assets(suite: Positional[Literal["rlbench"]], source: Annotated[Path, tyro.c
     from imop.tasks.rlbench.assets import folder, install
 
     files = [name.removeprefix(f"{suite}/") for name in RLBENCH]
-    with console.status(f"reading {source}"):
+    with _status(f"reading {source}"):
         problems = install(source, files)
     for file, problem in problems.items():
         if problem:
-            console.print(f"[red]{file}.ttm[/]: {problem}", highlight=False)
+            console.print(f"{file}.ttm: {problem}", style="red")
     missing = [file for file in files if file not in problems]
     if missing:
-        console.print(f"not found: {', '.join(missing)}", highlight=False)
+        console.print(f"not found: {', '.join(missing)}")
     ready = sum(task.available() for task in RLBENCH.values())
-    console.print(f"{ready} of {len(files)} tasks of {suite} are available, from {folder()}", highlight=False)
+    console.print(f"{ready} of {len(files)} tasks of {suite} are available, from {folder()}")
     return 1 if any(problems.values()) else 0
 
 
@@ -321,8 +342,9 @@ def train(
     from imop.networks.model import PAPER, SMALL
     from imop.training.loop import train as run_training
 
+    writable_folder(config.out)
     run_training(config, ablation.of(SMALL if size == "small" else PAPER), console=console)
-    console.print(config.out, highlight=False)
+    console.print(config.out)
     return 0
 
 
@@ -352,8 +374,20 @@ def main(arguments: list[str] | None = None) -> None:
     try:
         code = app.cli(prog="imop", description=__doc__, args=arguments)
     except ImopError as error:
-        Console(stderr=True, soft_wrap=True).print(f"[red]error:[/] {error}", highlight=False)
-        code = 2
+        code = _fail(str(error))
+    except BrokenPipeError:
+        # Who reads our output has seen enough; Python would complain once more when it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = 0
+    except OSError as error:
+        code = _fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except KeyboardInterrupt:
         code = 130
     sys.exit(code)
+
+
+def _fail(problem: str) -> int:
+    """Say it in one line; the exit code for bad input."""
+    line = Text.assemble(("error:", "red"), " ", " ".join(problem.split()))
+    Console(stderr=True, soft_wrap=True).print(line)
+    return 2

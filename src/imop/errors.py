@@ -1,11 +1,23 @@
 """Every error that imop raises on purpose derives from `ImopError` and names what would be accepted."""
 
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 
 class ImopError(Exception):
-    """Base of all errors raised on purpose."""
+    """Base of all errors raised on purpose.
+
+    They survive pickling with message and attributes, whatever their constructors take: workers of other
+    processes hand them over.
+    """
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _unpickled, (type(self), self.args), self.__dict__
+
+
+def _unpickled(kind: type[ImopError], args: tuple[Any, ...]) -> ImopError:
+    # The constructor would ask for what the message was made of; `args` holds the message itself.
+    return kind.__new__(kind, *args)
 
 
 class InvalidInput(ImopError, ValueError):

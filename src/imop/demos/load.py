@@ -4,7 +4,7 @@ from pathlib import Path
 
 from imop.demos.rlbench import episodes, read_episode
 from imop.demos.store import DemonstrationStore
-from imop.errors import CorruptData
+from imop.errors import CorruptData, InvalidInput
 from imop.types import Demonstration
 
 
@@ -23,3 +23,20 @@ def load_demonstrations(path: Path, count: int | None = None) -> list[Demonstrat
     if not found:
         raise CorruptData(path, "holds no demonstration", "record or import one into it")
     return found
+
+
+def load_demonstration(path: Path, episode: int = 0) -> Demonstration:
+    """One demonstration of a store, or of a folder in RLBench's layout, by its number; no other is read.
+
+    Raises:
+        CorruptData: if there is none, or it cannot be read.
+        InvalidInput: if `path` is neither, or has no such episode.
+    """
+    in_store = (path / "zarr.json").is_file()
+    known = DemonstrationStore.open(path) if in_store else episodes(path)
+    if not len(known):
+        raise CorruptData(path, "holds no demonstration", "record or import one into it")
+    if not 0 <= episode < len(known):
+        raise InvalidInput("episode", f"{episode}", f"0 .. {len(known) - 1} for {path}")
+    found = known[episode]
+    return read_episode(found) if isinstance(found, Path) else found
