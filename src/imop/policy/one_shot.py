@@ -32,6 +32,9 @@ class OneShotPolicy:
         min_confidence: below it `act` raises `NoConfidentMatch`; 0 acts always.
         feasible: whether the arm can take the gripper to T_world_gripper (4, 4); of poses that are about as
             right, the first feasible one is taken.
+
+    Raises:
+        InvalidInput: for a `min_confidence` out of its range.
     """
 
     def __init__(
@@ -42,6 +45,8 @@ class OneShotPolicy:
         min_confidence: float = 0.0,
         feasible: Feasible | None = None,
     ):
+        if not 0.0 <= min_confidence <= 1.0:
+            raise InvalidInput("min_confidence", f"{min_confidence}", "a number from 0 to 1")
         self._matcher = matcher
         self._perception = perception
         self.router = router or AdvancingRouter()

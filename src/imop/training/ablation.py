@@ -3,6 +3,8 @@
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
+from imop.errors import InvalidInput
+
 if TYPE_CHECKING:
     # The command line shows these switches without waiting for torch.
     from imop.networks.model import ModelConfig
@@ -27,11 +29,17 @@ class Ablation:
     pose: Literal["analytic", "from_matches", "regressed"] = "analytic"
 
     def of(self, config: "ModelConfig") -> "ModelConfig":
-        """The configuration with the chosen rows instead of its own."""
+        """The configuration with the chosen rows instead of its own.
+
+        Raises:
+            InvalidInput: for less than one neighbour.
+        """
         k, attention = self.neighbours, self.attention or config.matching.attention
         matching = replace(config.matching, attention=attention, region_first=self.region_first)
         graph, route_graph = config.graph, config.route_graph
         if k is not None:
+            if k < 1:
+                raise InvalidInput("neighbours", f"{k}", "a whole number from 1 on")
             graph, route_graph = replace(graph, neighbours=k), replace(route_graph, neighbours=k)
             matching = replace(matching, neighbours=k)
         return replace(

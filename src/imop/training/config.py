@@ -1,8 +1,11 @@
 """How to train, apart from the loop so that the command line can show it without waiting for torch."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
+
+from imop.errors import InvalidInput
 
 Network = Literal["region", "matching", "routing", "pose"]
 
@@ -52,3 +55,21 @@ class TrainConfig:
     seed: int = 0
     workers: int = 1
     mixed: bool = True
+
+    def check_numbers(self) -> None:
+        """Not done when it is made, where tyro would tell it in its own words.
+
+        Raises:
+            InvalidInput: for a number out of its range.
+        """
+        for name in ("steps", "batch", "every", "validation_pairs", "warm_up", "workers", "seed"):
+            least = 0 if name in ("warm_up", "workers", "seed") else 1
+            if getattr(self, name) < least:
+                raise InvalidInput(name, f"{getattr(self, name)}", f"a whole number from {least} on")
+        for name in ("learning_rate", "clip"):
+            if not 0 < getattr(self, name) < math.inf:
+                raise InvalidInput(name, f"{getattr(self, name)}", "a positive number")
+        if not 0 <= self.weight_decay < math.inf:
+            raise InvalidInput("weight_decay", f"{self.weight_decay}", "0 or a positive number")
+        if not 0 <= self.ema < 1:
+            raise InvalidInput("ema", f"{self.ema}", "a number from 0 up to, but not, 1")

@@ -105,7 +105,8 @@ def train(
 
     Raises:
         CorruptData: if shards or the checkpoint cannot be read.
-        InvalidInput: if there is nothing to train on, or the networks do not go together.
+        InvalidInput: if a number is out of its range, there is nothing to train on, or the networks do not
+            go together.
     """
     shape = model_config or ModelConfig()
     _check(config, shape)
@@ -138,6 +139,7 @@ def _fabric() -> Fabric:
 
 
 def _check(config: TrainConfig, shape: ModelConfig) -> None:
+    config.check_numbers()
     pairs, routes = set(config.networks) - {"routing"}, "routing" in config.networks
     if not config.networks:
         raise InvalidInput("networks", "none", f"some of {', '.join(NETWORKS)}")
