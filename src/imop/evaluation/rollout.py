@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Protocol
 
 from imop.errors import NoConfidentMatch
-from imop.geometry import se3
+from imop.geometry.accuracy import errors
 from imop.tasks.env import ImopEnv, to_array
 from imop.types import Action, Demonstration, FloatArray, Observation
 
@@ -30,7 +30,8 @@ class Step:
 
     Attributes:
         support_step: demonstrated step that was transferred, or None.
-        position_error: metres to where the expert would go from the same state, or None if it has no say.
+        position_error: metres to where the expert would go from the same state, or None if it has no say; of
+            several poses that look the same the nearest counts.
         rotation_error: radians, likewise.
         confidence: the policy's.
         policy_seconds: time to decide.
@@ -64,7 +65,7 @@ def rollout(
     env: ImopEnv,
     policy: Policy,
     steps: int,
-    expert_pose: Callable[[int], FloatArray | None] = lambda step: None,
+    expert_poses: Callable[[int], FloatArray | None] = lambda step: None,
     on_action: Callable[[Observation, Action], None] = lambda observation, action: None,
 ) -> Rollout:
     """Act until success, failure or `steps` actions, in an environment that was just reset.
@@ -73,7 +74,8 @@ def rollout(
         env: the environment.
         policy: has watched its demonstrations.
         steps: most actions allowed.
-        expert_pose: T_world_gripper of the expert for the step of the given number, from the state now.
+        expert_poses: (N, 4, 4) T_world_gripper that are right for the step of the given number, from the
+            state now.
         on_action: called before each action is executed.
     """
     policy.reset()
@@ -87,15 +89,15 @@ def rollout(
             return Rollout(False, "no confident match", tuple(taken))
         decided = time.perf_counter()
         support_step = action.match.step if action.match else None
-        wanted = expert_pose(number if support_step is None else support_step)
+        right = expert_poses(number if support_step is None else support_step)
+        position, rotation = (None, None) if right is None else errors(action.T_world_gripper, right)
         on_action(observation, action)
         _, _, terminated, truncated, info = env.step(to_array(action))
-        reached = action.T_world_gripper
         taken.append(
             Step(
                 support_step,
-                None if wanted is None else float(se3.translation_distance(wanted, reached)),
-                None if wanted is None else float(se3.rotation_distance(wanted, reached)),
+                position,
+                rotation,
                 action.confidence,
                 decided - started,
                 time.perf_counter() - decided,

@@ -6,8 +6,11 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
+from imop.evaluation.appearance import Appearance
+from imop.evaluation.expert_poses import ExpertPoses
 from imop.evaluation.open_loop import Prediction, predict
 from imop.evaluation.picture import Panel, save_picture
+from imop.evaluation.recordings import objects_world
 from imop.evaluation.report import save_json
 from imop.evaluation.rollout import Rollout, rollout
 from imop.evaluation.trials import Trial, make_policy, most_actions
@@ -15,7 +18,7 @@ from imop.evaluation.video import save_video
 from imop.geometry import se3
 from imop.sim.cameras import look_at, render_view
 from imop.sim.world import World
-from imop.types import Action, ByteArray, Demonstration, FloatArray, Observation
+from imop.types import Action, ByteArray, Demonstration, Observation
 
 VIDEO_SIZE = (320, 240)
 VIDEO_STRIDE = 2
@@ -61,15 +64,15 @@ def perform(
     env.on_frame = film if video else None
     panels: list[Panel] = []
 
-    def expert_pose(step: int) -> FloatArray | None:
-        waypoints = env.task.waypoints(env.world)
-        return waypoints[step].target(env.world) if step < len(waypoints) else None
+    appearance = Appearance(objects_world(trial))
+    expert = ExpertPoses(env.task, env.world, lambda: env.observation, appearance)
 
     def on_action(observation: Observation, action: Action) -> None:
         step = action.match.step if action.match else len(panels)
+        expert.took(step, action)
         panels.append(Panel(demonstration.keyframes[step], observation, action, f"step {step}"))
 
-    result = rollout(env, policy, most_actions(method, demonstration, env.task), expert_pose, on_action)
+    result = rollout(env, policy, most_actions(method, demonstration, env.task), expert, on_action)
     save_json({**asdict(trial), "method": method, **result.as_dict()}, out / "result.json")
     if panels:
         save_picture(panels, out / "steps.png")
