@@ -6,8 +6,11 @@ import pytest
 
 from imop import DemonstrationStore
 from imop.cli import main
+from imop.demos.frames import moved
 from imop.evaluation.trials import Trial, demonstration_for
+from imop.geometry import se3
 from imop.networks.model import load_model
+from imop.sim.robot import T_WORLD_BASE
 from imop.training.shards import write_shard
 from tests.training.test_pairs import pair
 
@@ -107,6 +110,20 @@ def test_predict_of_the_demonstration_itself_is_exact_for_replay(store, tmp_path
     assert imop("predict", "--demo", store, "--query", store, "--method", "replay", "--out", tmp_path) == 0
     steps = json.loads((tmp_path / "result.json").read_text())["steps"]
     assert np.allclose([step["position_error"] for step in steps], 0)
+
+
+def test_predict_takes_recordings_whose_table_is_at_height_0(store, tmp_path, capsys):
+    T = se3.invert(T_WORLD_BASE)
+    on_the_floor = DemonstrationStore.create(tmp_path / "base frame.zarr")
+    on_the_floor.append(moved(DemonstrationStore.open(store)[0], T))
+    shown = ("--demo", on_the_floor.path, "--query", on_the_floor.path, "--method", "registration")
+    assert imop("predict", *shown, "--out", tmp_path) == 2
+    assert "--base" in capsys.readouterr().err
+    assert imop("predict", *shown, "--out", tmp_path, "--base", 0, 0, 0) == 0
+    steps = json.loads((tmp_path / "result.json").read_text())["steps"]
+    assert max(step["position_error"] for step in steps) < 0.01
+    recorded = on_the_floor[0].keyframes[0].action.T_world_gripper
+    assert np.allclose(steps[0]["T_world_gripper"][:3], recorded[:3, 3], atol=0.01)
 
 
 def test_collect_appends_to_a_store_that_passes_the_check(tmp_path):

@@ -243,6 +243,7 @@ def predict(
     query: Path,
     demo_episode: int = 0,
     query_episode: int = 0,
+    base: tuple[float, float, float] | None = None,
     method: Literal["learned", "replay", "registration"] = "learned",
     weights: Path | None = None,
     out: Path = Path("runs/predict"),
@@ -256,6 +257,8 @@ def predict(
         query: store or folder with the recorded episode to predict.
         demo_episode: number of the demonstration's episode.
         query_episode: number of the episode to predict.
+        base: where the robot's base is in the recordings' frame, metres; by default as in the simulation,
+            with a table at a height of 0.752 m.
         method: how poses are carried over from the demonstration.
         weights: folder that `imop train` wrote; by default the bundled weights.
         out: folder for the results.
@@ -266,7 +269,7 @@ def predict(
     writable_folder(out)
     shown, recorded = load_demonstration(demo, demo_episode), load_demonstration(query, query_episode)
     with _status(f"predicting {query}"):
-        predictions = predict_recorded(shown, recorded, method, out, weights)
+        predictions = predict_recorded(shown, recorded, method, out, weights, base)
     console.print(predictions_table(predictions))
     _list(out)
     return 0

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
+from imop.demos.frames import moved
 from imop.evaluation.appearance import Appearance
 from imop.evaluation.expert_poses import ExpertPoses
 from imop.evaluation.open_loop import Prediction, predict
@@ -17,6 +18,7 @@ from imop.evaluation.trials import Trial, make_policy, most_actions
 from imop.evaluation.video import save_video
 from imop.geometry import se3
 from imop.sim.cameras import look_at, render_view
+from imop.sim.robot import T_WORLD_BASE
 from imop.sim.world import World
 from imop.types import Action, ByteArray, Demonstration, Observation
 
@@ -104,19 +106,31 @@ def predict_recorded(
     method: str,
     out: Path,
     weights: Path | None = None,
+    p_world_base: tuple[float, float, float] | None = None,
 ) -> list[Prediction]:
     """Predict every keyframe of `recorded` and write result.json and steps.png into `out`.
+
+    Args:
+        demonstration: what is shown.
+        recorded: what is asked.
+        method: as for `make_policy`.
+        out: folder for the results.
+        weights: folder of the learned policy's weights; by default the bundled ones.
+        p_world_base: (3,) metres, where the robot's base is in the recordings' frame, whose axes are the
+            base's; by default where the simulated one is.
 
     Raises:
         ImopError: if either recording cannot be used.
     """
+    T_imop_world = np.eye(4) if p_world_base is None else T_WORLD_BASE @ se3.invert(se3.make(p=p_world_base))
+    demonstration, recorded = (moved(d, T_imop_world) for d in (demonstration, recorded))
     policy = make_policy(method, weights=weights)
     policy.watch(demonstration.stripped())
     predictions = predict(policy, recorded)
     steps = [
         {
             "step": p.step,
-            "T_world_gripper": se3.to_pose7(p.action.T_world_gripper).tolist(),
+            "T_world_gripper": se3.to_pose7(se3.invert(T_imop_world) @ p.action.T_world_gripper).tolist(),
             "gripper_open": p.action.gripper_open,
             "allow_collisions": p.action.allow_collisions,
             "confidence": p.action.confidence,

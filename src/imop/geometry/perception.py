@@ -70,14 +70,23 @@ class Perception:
             InvalidInput: if no depth was measured, if nothing lies in the workspace, or if the self-filter
                 is on and the observation has no joint positions.
         """
-        cloud = clouds.crop(clouds.fuse(observation), self.lower, self.upper)
+        everything = clouds.fuse(observation)
+        cloud = clouds.crop(everything, self.lower, self.upper)
         if self.robot_mask is not None:
             cloud = cloud.select(~self._robot(cloud, observation, self.robot_mask))
         if not len(cloud):
-            accepted = f"points between {self.lower} and {self.upper} m, world frame"
-            raise InvalidInput("views", "nothing is left in the workspace", accepted)
+            raise self._nothing(everything)
         cloud = clouds.voxel_downsample(cloud, self.voxel)
         return cloud.select(clouds.farthest_points(cloud.points, self.max_points))
+
+    def _nothing(self, everything: PointCloud) -> InvalidInput:
+        low, high = np.percentile(everything.points, [5, 95], axis=0).round(2).tolist()
+        problem = f"nothing is left in the workspace, most points lie between {low} and {high} m"
+        accepted = (
+            f"points between {self.lower} and {self.upper} m, world frame; else say where the robot's base "
+            "is (imop predict --base), or give Perception the bounds of the workspace"
+        )
+        return InvalidInput("views", problem, accepted)
 
     @staticmethod
     def _robot(cloud: PointCloud, observation: Observation, robot_mask: RobotMask) -> BoolArray:
