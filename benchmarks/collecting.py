@@ -16,8 +16,8 @@ from joblib import delayed
 from rich.console import Console
 from rich.table import Table
 
-from imop.evaluation.benchmark import parallel
 from imop.evaluation.collect import COLLECTION_SEED, RETRY_STRIDE, Key, record
+from imop.evaluation.jobs import parallel
 from imop.evaluation.report import save_json
 from imop.evaluation.splits import chosen_tasks
 from imop.tasks.env import make_task

@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.table import Table
 
 from imop.errors import ImopError
-from imop.evaluation.benchmark import parallel
+from imop.evaluation.jobs import parallel
 from imop.evaluation.report import save_json
 from imop.evaluation.rollout import rollout
 from imop.evaluation.trials import Trial, demonstration_for, make_policy

@@ -17,7 +17,7 @@ from joblib import delayed
 from rich.console import Console
 
 from imop.errors import ImopError, InvalidInput
-from imop.evaluation.benchmark import parallel
+from imop.evaluation.jobs import parallel
 from imop.evaluation.report import Count, Results, save_json
 from imop.evaluation.splits import chosen_tasks
 from imop.tasks.env import make_task

@@ -26,8 +26,8 @@ from rich.console import Console
 from rich.table import Table
 
 from imop.errors import ImopError, InvalidInput
-from imop.evaluation.benchmark import parallel
 from imop.evaluation.cases import CaseOptions, made
+from imop.evaluation.jobs import parallel
 from imop.evaluation.open_loop import Case, RecordedPoses, ask
 from imop.evaluation.open_loop_rows import Row, by_task
 from imop.evaluation.oracle import OraclePolicy

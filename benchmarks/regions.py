@@ -20,8 +20,8 @@ from rich.console import Console
 from rich.table import Table
 
 from imop.demos.regions import BACKGROUND, SegmentedState, invariant_region, segmented
-from imop.evaluation.benchmark import parallel
 from imop.evaluation.collect import COLLECTION_SEED, RETRY_STRIDE
+from imop.evaluation.jobs import parallel
 from imop.evaluation.report import save_json
 from imop.evaluation.splits import chosen_tasks
 from imop.geometry import se3

@@ -10,15 +10,16 @@ BASE = {"types", "errors", "files"}
 ALLOWED = {
     "errors": set(),
     "files": {"errors"},
+    "plugins": {"errors"},
     "types": {"errors"},
     "geometry": BASE,
     "demos": BASE | {"geometry"},
     "networks": BASE | {"geometry", "demos"},
     "policy": BASE | {"geometry", "demos", "networks"},
     "sim": BASE | {"geometry"},
-    "tasks": BASE | {"geometry", "sim"},
+    "tasks": BASE | {"geometry", "sim", "plugins"},
     "training": BASE | {"geometry", "demos", "networks", "sim"},
-    "evaluation": BASE | {"geometry", "demos", "networks", "policy", "training", "sim", "tasks"},
+    "evaluation": BASE | {"geometry", "demos", "networks", "policy", "training", "sim", "tasks", "plugins"},
 }
 
 

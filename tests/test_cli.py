@@ -15,6 +15,7 @@ from imop.training.shards import write_shard
 from tests.training.test_pairs import pair
 
 VERBS = (
+    "check-task",
     "run",
     "collect",
     "eval",

@@ -7,8 +7,11 @@ from .policy.learned_router import LearnedRouter
 from .policy.one_shot import OneShotPolicy
 from .policy.registration import RegistrationMatcher
 from .sim.robot import panda_self_filter
+from .tasks.check_task import check_task
 from .tasks.env import make_env, make_task, to_array, to_observation
 from .tasks.expert import record_demonstration
+from .tasks.task import Task
+from .tasks.waypoint import Waypoint
 from .types import Action, CameraView, Demonstration, Keyframe, Observation
 
 __all__ = [
@@ -27,6 +30,9 @@ __all__ = [
     "Perception",
     "PlanFailed",
     "RegistrationMatcher",
+    "Task",
+    "Waypoint",
+    "check_task",
     "load_demonstrations",
     "make_env",
     "make_task",

@@ -53,7 +53,7 @@ def run(
     instance: int = 0,
     demo: Path | None = None,
     demo_episode: int = 0,
-    method: Literal["learned", "routed", "replay", "registration", "oracle"] = "learned",
+    method: str = "learned",
     weights: Path | None = None,
     min_confidence: float = 0.0,
     video: bool = True,
@@ -64,13 +64,15 @@ def run(
     Writes result.json, steps.png (demonstration, region, correspondences, predicted gripper) and rollout.mp4.
 
     Args:
-        task: suite and name, such as tabletop/lid_off_pot; `imop tasks` lists them.
+        task: suite and name, such as tabletop/lid_off_pot (`imop tasks` lists them), or one's own, such as
+            my_tasks:OpenFridge.
         seed: scene to perform the task in.
         variation: which variation of the task.
         instance: seed of the objects' shapes, sizes and colours.
         demo: store or folder of RLBench's layout with a demonstration; one is recorded if not given.
         demo_episode: which of its episodes.
-        method: how poses are carried over from the demonstration.
+        method: learned, routed, replay, registration, textbook, oracle (true object poses), or one's own,
+            such as my_methods:MyPolicy.
         weights: folder that `imop train` wrote; by default the bundled weights.
         min_confidence: stop instead of acting below this confidence, 0 to 1.
         video: whether to draw rollout.mp4, which takes longer than the task itself.
@@ -99,7 +101,7 @@ def run(
 def collect(
     out: Path,
     suite: str = "tabletop",
-    split: Literal["base", "novel", "cross_object", "all"] = "all",
+    split: str = "all",
     tasks: tuple[str, ...] = (),
     episodes: int = 10,
     seed: int = 0,
@@ -116,7 +118,7 @@ def collect(
 
     Args:
         out: folder of the store; an existing one is continued.
-        suite: which suite.
+        suite: tabletop, rlbench, or one's own, such as my_suite:SUITE.
         split: which of its tasks.
         tasks: names within the split; all if none is given.
         episodes: demonstrations per task and variation, each in its own scene.
@@ -159,12 +161,12 @@ def evaluate(
     the same code and weights is not tried again.
 
     Args:
-        suite: which suite.
+        suite: tabletop, rlbench, or one's own, such as my_suite:SUITE.
         split: base, novel, cross_object or all.
         tasks: names within the split; all if none is given.
         methods: any of replay, textbook (FPFH, RANSAC and ICP of Open3D, extra baselines), registration,
             learned, routed (learned, and the routing network may go back to a step), oracle (true object
-            poses), expert, joined by commas.
+            poses), expert, or one's own (my_methods:MyPolicy), joined by commas.
         episodes: scenes per task, spread over its variations.
         seed: first seed of the scenes.
         instance: seed of the objects' shapes, sizes and colours.
@@ -244,7 +246,7 @@ def predict(
     demo_episode: int = 0,
     query_episode: int = 0,
     base: tuple[float, float, float] | None = None,
-    method: Literal["learned", "replay", "registration"] = "learned",
+    method: str = "learned",
     weights: Path | None = None,
     out: Path = Path("runs/predict"),
 ) -> int:
@@ -259,7 +261,7 @@ def predict(
         query_episode: number of the episode to predict.
         base: where the robot's base is in the recordings' frame, metres; by default as in the simulation,
             with a table at a height of 0.752 m.
-        method: how poses are carried over from the demonstration.
+        method: learned, replay, registration, textbook, or one's own, such as my_methods:MyPolicy.
         weights: folder that `imop train` wrote; by default the bundled weights.
         out: folder for the results.
     """
@@ -278,14 +280,14 @@ def predict(
 @app.command
 def tasks(
     suite: str = "tabletop",
-    split: Literal["base", "novel", "cross_object", "all"] = "all",
+    split: str = "all",
     contact_sheet: Path | None = None,
     jobs: int = 2,
 ) -> int:
     """List tasks with their split, variations and instructions; draw them if wanted.
 
     Args:
-        suite: which suite.
+        suite: tabletop, rlbench, or one's own, such as my_suite:SUITE.
         split: which of its tasks.
         contact_sheet: PNG file to draw every task in four scenes into.
         jobs: parallel processes for the drawing.
@@ -299,6 +301,23 @@ def tasks(
         save_contact_sheet(chosen_tasks(suite, split), contact_sheet, jobs, console)
         console.print(contact_sheet)
     return 0
+
+
+@app.command
+def check_task(task: Positional[str]) -> int:
+    """Say what is wrong with a task of one's own, and how to mend it.
+
+    Args:
+        task: module:Class, or any other name of a task.
+    """
+    from imop.tasks.check_task import check_task as find
+
+    with _status(f"trying {task}"):
+        problems = find(task)
+    for problem in problems:
+        console.print(problem, soft_wrap=True)
+    console.print(f"{task}: {len(problems)} problems")
+    return 1 if problems else 0
 
 
 @app.command

@@ -12,8 +12,9 @@ from imop import DemonstrationStore
 from imop.errors import InvalidInput, MissingExtra
 from imop.evaluation import collect as module
 from imop.evaluation.collect import COLLECTION_SEED, RETRY_STRIDE, collect, recorded_seeds
-from imop.evaluation.splits import SPLITS, chosen_tasks
+from imop.evaluation.splits import chosen_tasks
 from imop.tasks.expert import ExpertFailed
+from imop.tasks.suites import SUITES
 
 POT = "tabletop/lid_off_pot"
 QUIET = Console(quiet=True)
@@ -100,7 +101,7 @@ def test_a_failed_attempt_is_repeated_in_another_scene_and_counted(monkeypatch, 
 
 
 def test_splits_do_not_overlap_and_make_up_the_suite():
-    splits = SPLITS["tabletop"]
+    splits = SUITES["tabletop"]
     parts = [name for split in ("base", "novel", "cross_object") for name in splits[split]]
     assert sorted(parts) == sorted(splits["all"]) and len(set(parts)) == len(parts)
     assert chosen_tasks("tabletop", "novel", ("lid_off_pot",)) == [POT]

@@ -7,7 +7,7 @@ from rich.console import Console
 
 from imop.errors import InvalidInput
 from imop.evaluation.contact_sheet import SCENES, picture, save_contact_sheet, tasks_table
-from imop.evaluation.splits import SPLITS
+from imop.tasks.suites import SUITES
 
 DRAWER = "tabletop/open_drawer"
 
@@ -35,7 +35,7 @@ def test_only_png_is_written(tmp_path):
 
 def test_the_table_tells_split_variations_and_instructions():
     console = Console(width=200, record=True, file=io.StringIO())
-    console.print(tasks_table(list(SPLITS["tabletop"]["all"]), "tabletop"))
+    console.print(tasks_table(list(SUITES["tabletop"]["all"]), "tabletop"))
     text = console.export_text()
     assert "open the bottom drawer" in text and "open the top drawer" in text
     assert (

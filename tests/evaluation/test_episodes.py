@@ -4,7 +4,8 @@ from imop.errors import CorruptData
 from imop.evaluation.episodes import Episode, EpisodeLog, method_state
 from imop.evaluation.trials import Trial
 
-TRIAL = Trial("tabletop/lid_off_pot", 3, 1, 2)
+POT = "tabletop/lid_off_pot"
+TRIAL = Trial(POT, 3, 1, 2)
 
 
 def test_what_was_added_is_found_again(tmp_path):
@@ -41,6 +42,11 @@ def test_a_damaged_line_is_named(tmp_path, line):
 
 def test_weights_count_only_for_methods_that_have_some(tmp_path):
     (tmp_path / "weights.safetensors").write_bytes(b"others")
-    assert method_state("learned", None) != method_state("learned", tmp_path)
-    assert method_state("registration", None) == method_state("registration", tmp_path)
-    assert method_state("expert", None) != method_state("registration", None)
+    assert method_state("learned", None, POT) != method_state("learned", tmp_path, POT)
+    assert method_state("registration", None, POT) == method_state("registration", tmp_path, POT)
+    assert method_state("expert", None, POT) != method_state("registration", None, POT)
+
+
+def test_the_states_of_our_own_tasks_need_no_further_digest():
+    assert method_state("expert", None, POT).count("-") == 0
+    assert method_state("learned", None, POT).count("-") == 2

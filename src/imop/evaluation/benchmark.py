@@ -1,23 +1,20 @@
 """Success rates of several methods on the same demonstrations and scenes."""
 
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
-from typing import Any
 
-from joblib import Parallel, delayed
+from joblib import delayed
 from rich.console import Console
-from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from imop.errors import ImopError, InvalidInput
+from imop.errors import AssetMissing, ImopError, MissingExtra
 from imop.evaluation.episodes import Episode, EpisodeLog, method_state
+from imop.evaluation.jobs import parallel
 from imop.evaluation.report import Count, Results
 from imop.evaluation.rollout import rollout
 from imop.evaluation.trials import Trial, demonstration_for, make_policy, most_actions, suite_trials
 from imop.tasks.expert import perform
 from imop.tasks.layout import NoRoom
 from imop.types import Demonstration
-
-METHODS = ("replay", "textbook", "registration", "learned", "routed", "oracle", "expert")
 
 NOTES = (
     "One demonstration per task and variation, from a scene that is never tested.",
@@ -49,7 +46,7 @@ def evaluate_suite(
         suite: which suite.
         split: which of its tasks.
         tasks: only these; all if empty.
-        methods: names of `METHODS`.
+        methods: names of `METHODS`, or of one's own, see `make_policy`.
         episodes: scenes per task.
         seed: of the first scene.
         instance: of the objects.
@@ -62,28 +59,29 @@ def evaluate_suite(
         InvalidInput: for an unknown suite, split, task or method.
         CorruptData: if the log cannot be read.
     """
-    if unknown := [method for method in methods if method not in METHODS]:
-        raise InvalidInput("methods", unknown[0], ", ".join(METHODS))
     trials = suite_trials(suite, split, tasks, episodes, seed, instance)
-    states = {method: method_state(method, weights) for method in methods}
+    for method in methods:
+        if method not in ("oracle", "expert"):
+            make_policy(method, weights=weights)  # what is missing is said before anything is tried
     known = EpisodeLog(log)
+    state = cache(lambda task, method: method_state(method, weights, task))
     missing = [
         (trial, method)
         for of_task in trials.values()
         for trial in of_task
         for method in methods
-        if known.find(trial, method, states[method]) is None
+        if known.find(trial, method, state(trial.task, method)) is None
     ]
     shown = _demonstrations([trial for trial, _ in missing], jobs, console)
     work = [
-        delayed(attempt)(trial, shown[shown_together(trial)], method, states[method], weights)
+        delayed(attempt)(trial, shown[shown_together(trial)], method, state(trial.task, method), weights)
         for trial, method in missing
     ]
     for episode in parallel(work, jobs, console, "episodes"):
         known.add(episode)
     counts = {
         method: {
-            task: _count([known.find(trial, method, states[method]) for trial in of_task])
+            task: _count([known.find(trial, method, state(trial.task, method)) for trial in of_task])
             for task, of_task in trials.items()
         }
         for method in methods
@@ -97,14 +95,17 @@ def attempt(
     """How a method that was shown the demonstration does in one scene."""
     try:
         env = trial.env()
+    except NoRoom as error:
+        return Episode(trial, method, state, None, str(error))
+    try:
         if method == "expert":
             perform(env.task, env.world)
             return Episode(trial, method, state, True, "success", len(demonstration))
         policy = make_policy(method, env.world, weights=weights)
         policy.watch(demonstration if method == "oracle" else demonstration.stripped())
         result = rollout(env, policy, most_actions(method, demonstration, env.task))
-    except NoRoom as error:
-        return Episode(trial, method, state, None, str(error))
+    except (MissingExtra, AssetMissing):
+        raise  # says nothing about the method
     except ImopError as error:
         # What a policy cannot handle it has failed at; the other methods and scenes go on.
         return Episode(trial, method, state, False, str(error))
@@ -127,10 +128,3 @@ def _demonstrations(
     wanted = {shown_together(trial): trial for trial in trials}
     work = [delayed(demonstration_for)(trial) for trial in wanted.values()]
     return dict(zip(wanted, parallel(work, jobs, console, "demonstrations"), strict=True))
-
-
-def parallel(work: list[Any], jobs: int, console: Console, title: str) -> Iterator[Any]:
-    """Results of joblib's delayed calls in order, computed by `jobs` processes, with a progress bar."""
-    columns = (TextColumn(title), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as progress:
-        yield from progress.track(Parallel(n_jobs=jobs, return_as="generator")(work), total=len(work))

@@ -20,6 +20,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from imop.demos.store import DemonstrationStore
 from imop.errors import InvalidInput, MissingExtra
+from imop.evaluation.jobs import check_jobs
 from imop.evaluation.report import save_json
 from imop.tasks.env import make_task
 from imop.tasks.expert import ExpertFailed, record_demonstration
@@ -93,7 +94,7 @@ def collect(
         in_turn: `episodes` counts per task, and the sets of objects have its variations in turn.
 
     Raises:
-        InvalidInput: for an unknown task, no episodes, no scenes or a negative seed.
+        InvalidInput: for an unknown task, no episodes, no scenes, no processes or a negative seed.
         MissingExtra: if there is a cluster but Ray is not installed.
     """
     if episodes < 1 or not 0 <= seed <= RETRY_STRIDE - COLLECTION_SEED - episodes:
@@ -101,6 +102,7 @@ def collect(
         raise InvalidInput("episodes, seed", problem, "at least one episode, numbers from 0 to 8 million")
     if scenes < 1:
         raise InvalidInput("scenes", f"{scenes}", "at least one scene for the same objects")
+    check_jobs(jobs)
     wanted = [key for task in tasks for key in _keys(task, episodes, COLLECTION_SEED + seed, scenes, in_turn)]
     started = time.monotonic()
     store = DemonstrationStore.open(out) if _is_store(out) else DemonstrationStore.create(out)

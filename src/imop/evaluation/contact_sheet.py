@@ -8,13 +8,14 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from imop.errors import InvalidInput
-from imop.evaluation.benchmark import parallel
-from imop.evaluation.splits import SPLITS
+from imop.evaluation.jobs import parallel
 from imop.files import replaced
 from imop.sim.cameras import look_at, render_view
 from imop.tasks.env import make_task
+from imop.tasks.suites import find_suite
 from imop.tasks.task import make_scene
 from imop.types import ByteArray
 
@@ -61,7 +62,8 @@ def _variation(task: str, column: int) -> int:
 
 def tasks_table(tasks: list[str], suite: str) -> Table:
     """Split, number of variations, and the instructions of the first variations."""
-    split_of = {name: split for split in SPLITS[suite] if split != "all" for name in SPLITS[suite][split]}
+    splits = find_suite(suite)
+    split_of = {name: split for split in sorted(splits, key="all".__ne__) for name in splits[split]}
     table = Table(show_lines=True)
     table.add_column("task", no_wrap=True)
     table.add_column("instructions")
@@ -71,6 +73,7 @@ def tasks_table(tasks: list[str], suite: str) -> Table:
         if task.variations > _LISTED:
             shown.append("...")
         counted = f"{task.variations} variation{'s' if task.variations > 1 else ''}"
-        there = "" if task.available() else "\n[red]file missing[/]"
-        table.add_row(f"{name}\n{split_of[name]}, {counted}{there}", "\n".join(shown))
+        there = "" if task.available() else "\nfile missing"
+        row = Text.assemble(f"{name}\n{split_of[name]}, {counted}", (there, "red"))
+        table.add_row(row, Text("\n".join(shown)))
     return table

@@ -14,9 +14,10 @@ import imop.policy
 import imop.sim
 import imop.tasks
 from imop.errors import CorruptData
-from imop.evaluation.fingerprint import code_digest, weights_digest
-from imop.evaluation.trials import Trial
+from imop.evaluation.fingerprint import code_digest, own_code_digest, weights_digest
+from imop.evaluation.trials import METHODS, Trial, find_method
 from imop.networks.model import BUNDLED
+from imop.tasks.suites import find_task
 
 
 @dataclass(frozen=True)
@@ -67,14 +68,15 @@ class EpisodeLog:
         self._episodes[episode.trial, episode.method, episode.state] = episode
 
 
-def method_state(method: str, weights: Path | None) -> str:
-    """Digest of the code that decides how a method does, and of its weights if it has some."""
-    world = code_digest(imop.sim, imop.tasks, imop.geometry)
-    if method in ("expert", "oracle", "replay"):
-        return world
-    policy = code_digest(imop.policy, imop.networks, imop.demos)
-    learned = method in ("learned", "routed")
-    return "-".join([world, policy, *([weights_digest(weights or BUNDLED)] if learned else [])])
+def method_state(method: str, weights: Path | None, task: str) -> str:
+    """Digest of the code that decides how a method does in a task, and of its weights if it has some."""
+    digests = [code_digest(imop.sim, imop.tasks, imop.geometry)]
+    if method not in ("expert", "oracle", "replay"):
+        digests.append(code_digest(imop.policy, imop.networks, imop.demos))
+    if method in ("learned", "routed"):
+        digests.append(weights_digest(weights or BUNDLED))
+    own = [find_task(task)] + ([] if method in METHODS else [find_method(method)])
+    return "-".join([*digests, *own_code_digest(*own)])
 
 
 def read_episodes(path: Path) -> Iterator[Episode]:

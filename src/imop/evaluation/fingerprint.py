@@ -1,8 +1,10 @@
 """Short digests of code and weights, so that results of another state are not taken for those of this one."""
 
 import hashlib
+import sys
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from imop.networks.model import WEIGHTS
 
@@ -15,6 +17,23 @@ def code_digest(*packages: ModuleType) -> str:
             for file in sorted(Path(folder).rglob("*.py")):
                 digest.update(file.read_bytes())
     return digest.hexdigest()[:12]
+
+
+def own_code_digest(*made: Any) -> list[str]:
+    """Of the modules outside imop that define classes and what they inherit, or functions; none, no digest.
+
+    A module within a package stands for the whole package, for it may use the rest of it.
+    """
+    kinds = [kind for each in made for kind in getattr(each, "__mro__", (each,))]
+    names = {getattr(kind, "__module__", "builtins").partition(".")[0] for kind in kinds}
+    modules = [sys.modules[name] for name in sorted(names - {"imop", "builtins", "abc", "typing"})]
+    digest = hashlib.sha256()
+    for module in modules:
+        if hasattr(module, "__path__"):
+            digest.update(code_digest(module).encode())
+        elif module.__file__:
+            digest.update(Path(module.__file__).read_bytes())
+    return [digest.hexdigest()[:12]] if modules else []
 
 
 def weights_digest(folder: Path) -> str:

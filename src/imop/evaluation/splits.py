@@ -1,16 +1,8 @@
 """Which tasks of a suite are meant: by split, by name, or all."""
 
 from imop.errors import AssetMissing, InvalidInput
-from imop.tasks import rlbench
 from imop.tasks.rlbench.assets import COMMAND
-from imop.tasks.tabletop import BASE, CROSS_OBJECT, NOVEL, TABLETOP
-from imop.tasks.task import Task
-
-SPLITS: dict[str, dict[str, dict[str, type[Task]]]] = {
-    "tabletop": {"base": BASE, "novel": NOVEL, "cross_object": CROSS_OBJECT, "all": TABLETOP},
-    "rlbench": {"base": rlbench.BASE, "novel": rlbench.NOVEL, "all": rlbench.RLBENCH},
-}
-"""Suite -> split -> task by its full name."""
+from imop.tasks.suites import find_suite
 
 
 def chosen_tasks(
@@ -19,7 +11,7 @@ def chosen_tasks(
     """Full names of the tasks of a split, or of those of them that `tasks` names without the suite.
 
     Args:
-        suite: which suite.
+        suite: which suite, see `find_suite`.
         split: which of its tasks.
         tasks: which of these; all if empty.
         available: leave out tasks whose files are missing, if they are not named.
@@ -28,17 +20,17 @@ def chosen_tasks(
         InvalidInput: for an unknown suite, split or task.
         AssetMissing: if no task would be left.
     """
-    if suite not in SPLITS:
-        raise InvalidInput("suite", suite, ", ".join(SPLITS))
-    if split not in SPLITS[suite]:
-        raise InvalidInput("split", split, ", ".join(SPLITS[suite]))
-    names = list(SPLITS[suite][split])
+    splits = find_suite(suite)
+    if split not in splits:
+        raise InvalidInput("split", split, ", ".join(splits))
+    names = list(splits[split])
     known = [name.removeprefix(f"{suite}/") for name in names]
     if unknown := [task for task in tasks if task not in known]:
         raise InvalidInput("tasks", unknown[0], ", ".join(known))
     if tasks:
         return [f"{suite}/{task}" for task in tasks]
-    present = [name for name in names if SPLITS[suite][split][name].available()]
+    present = [name for name in names if splits[split][name].available()]
     if available and not present:
-        raise AssetMissing(f"the files of all {len(names)} tasks", COMMAND)
+        command = COMMAND if suite == "rlbench" else "what the suite's authors say"
+        raise AssetMissing(f"the files of all {len(names)} tasks", command)
     return present if available else names

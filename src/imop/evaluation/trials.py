@@ -1,12 +1,15 @@
 """Which scene a method is tried in, and which demonstration it was shown before."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
+from imop import plugins
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.oracle import OraclePolicy
 from imop.evaluation.rollout import Policy
-from imop.evaluation.splits import SPLITS, chosen_tasks
+from imop.evaluation.splits import chosen_tasks
 from imop.geometry.perception import Perception
 from imop.networks.model import BUNDLED
 from imop.policy.baselines import ReplayPolicy
@@ -20,12 +23,19 @@ from imop.sim.world import World
 from imop.tasks.env import ImopEnv, make_env, make_task
 from imop.tasks.expert import ExpertFailed, record_demonstration
 from imop.tasks.layout import NoRoom
+from imop.tasks.suites import find_task
 from imop.tasks.task import Task
 from imop.types import Demonstration
 
 DEMONSTRATION_SEED = 1_000_000
 """Demonstrations are recorded in scenes of this seed and above, and never tested there."""
 _RECORDING_ATTEMPTS = 20
+
+METHODS = ("replay", "textbook", "registration", "learned", "routed", "oracle", "expert")
+_METHOD = (
+    "what makes, called without arguments, an object with watch, reset and act, named module:object or by an "
+    "entry point imop.methods"
+)
 
 
 @dataclass(frozen=True)
@@ -37,12 +47,20 @@ class Trial:
         seed: of the poses and the clutter.
         variation: of the task.
         instance: seed of shapes, sizes and colours.
+
+    Raises:
+        InvalidInput: for a negative seed.
     """
 
     task: str
     seed: int
     variation: int = 0
     instance: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("seed", "instance"):
+            if getattr(self, name) < 0:
+                raise InvalidInput(name, f"{getattr(self, name)}", "a whole number from 0 on")
 
     def env(self) -> ImopEnv:
         """The environment, reset to this scene.
@@ -85,8 +103,7 @@ def suite_trials(
         raise InvalidInput("episodes", f"{episodes}", "at least 1")
     return {
         name.removeprefix(f"{suite}/"): [
-            Trial(name, seed + i, i % SPLITS[suite]["all"][name].variations, instance)
-            for i in range(episodes)
+            Trial(name, seed + i, i % find_task(name).variations, instance) for i in range(episodes)
         ]
         for name in chosen_tasks(suite, split, tasks)
     }
@@ -99,13 +116,14 @@ def make_policy(
 
     Args:
         method: learned, routed (learned, and the routing network chooses the step), replay, registration,
-            textbook or oracle.
+            textbook, oracle, or one's own: "module:object", or an entry point of the group imop.methods. The
+            object makes a `Policy` when it is called without arguments.
         world: the simulated world, which only the oracle reads.
         min_confidence: of the one-shot policies.
         weights: folder of the learned policy's weights; by default the bundled ones.
 
     Raises:
-        InvalidInput: for an unknown method, or an oracle without a world.
+        InvalidInput: for an unknown method, what makes no policy, or an oracle without a world.
         MissingExtra: for textbook without Open3D.
     """
     if method == "replay":
@@ -120,8 +138,25 @@ def make_policy(
         )
     if method == "oracle" and world is not None:
         return OraclePolicy(world)
-    known = "learned, routed, replay, registration, textbook, or (in simulation) oracle"
-    raise InvalidInput("method", method, known)
+    policy = find_method(method)()
+    if not all(callable(getattr(policy, name, None)) for name in ("watch", "reset", "act")):
+        raise InvalidInput("method", f"{method} makes a {type(policy).__name__}", _METHOD)
+    return cast(Policy, policy)
+
+
+def find_method(name: str) -> Callable[[], object]:
+    """What makes the policy of a method of one's own.
+
+    Raises:
+        InvalidInput: if there is none, or it cannot be called.
+    """
+    factory = plugins.find("method", name, "imop.methods")
+    if factory is None:
+        raise InvalidInput("method", name, f"{', '.join(METHODS)} (some only in simulation), or {_METHOD}")
+    if not callable(factory):
+        raise InvalidInput("method", f"{name} is a {type(factory).__name__}", _METHOD)
+    made: Callable[[], object] = factory
+    return made
 
 
 def most_actions(method: str, demonstration: Demonstration, task: Task) -> int:

@@ -14,26 +14,25 @@ from imop.sim.execute import execute
 from imop.sim.gripper import OnFrame
 from imop.sim.motion import WORKSPACE_LOWER, WORKSPACE_UPPER
 from imop.sim.world import World
-from imop.tasks.rlbench import RLBENCH
-from imop.tasks.tabletop import TABLETOP
+from imop.tasks.suites import find_task
 from imop.tasks.task import Task, make_scene, wait, watching
 from imop.types import Action, CameraView, FloatArray, Observation, as_array
 
 IMAGE = 128
-TASKS: dict[str, type[Task]] = {**TABLETOP, **RLBENCH}
 
 ObservationDict = dict[str, Any]
 
 
 def make_task(name: str) -> Task:
-    """The task called "suite/name".
+    """The task called "suite/name", "module:Class" or "module:SUITE/name", see `find_task`.
 
     Raises:
         InvalidInput: if there is no such task.
     """
-    if name not in TASKS:
-        raise InvalidInput("task", name, "one of " + ", ".join(TASKS))
-    return TASKS[name]()
+    task = find_task(name)()
+    # Recordings and results tell a task by what it was asked for with.
+    task.name = name
+    return task
 
 
 def make_env(

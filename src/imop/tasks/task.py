@@ -19,14 +19,14 @@ class Task(ABC):
     """A kind of scene and an aim. `build` makes one instance of it, which the other methods then speak about.
 
     Attributes:
-        name: "suite/name".
+        name: "suite/name"; of one's own task, what it was called by.
         variations: how many aims there are (which drawer, which colour).
         step_limit: how many actions an episode may take.
         insist: whether a motion that would touch something is made all the same if there is no other.
         graspable: bodies that the gripper may attach.
     """
 
-    name: ClassVar[str]
+    name: str = ""
     variations: ClassVar[int] = 1
     step_limit: ClassVar[int] = 25
     insist: ClassVar[bool] = False

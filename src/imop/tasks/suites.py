@@ -1,0 +1,86 @@
+"""Suites and their splits, and tasks by name: imop's, those of installed packages, and one's own."""
+
+import inspect
+from collections.abc import Mapping
+from difflib import get_close_matches
+from typing import Any
+
+from imop import plugins
+from imop.errors import InvalidInput
+from imop.tasks import rlbench
+from imop.tasks.tabletop import BASE, CROSS_OBJECT, NOVEL, TABLETOP
+from imop.tasks.task import Task
+
+Suite = Mapping[str, Mapping[str, type[Task]]]
+"""Split -> "suite/name" of a task -> the task; the split "all" has every task."""
+
+SUITES: dict[str, Suite] = {
+    "tabletop": {"base": BASE, "novel": NOVEL, "cross_object": CROSS_OBJECT, "all": TABLETOP},
+    "rlbench": {"base": rlbench.BASE, "novel": rlbench.NOVEL, "all": rlbench.RLBENCH},
+}
+
+_SUITE = "a mapping split -> name -> imop.Task, named module:SUITE or by an entry point imop.suites"
+_TASK = "a subclass of imop.Task, named module:Class or by an entry point imop.tasks"
+
+
+def find_suite(name: str) -> Suite:
+    """The suite of a name: one of `SUITES`, "module:SUITE", or an entry point of the group imop.suites.
+
+    In one's own suite tasks have plain names, and the split "all" need not be there.
+
+    Raises:
+        InvalidInput: if there is none, or it is no suite.
+    """
+    if name in SUITES:
+        return SUITES[name]
+    found = plugins.find("suite", name, "imop.suites")
+    if found is None:
+        raise InvalidInput("suite", name, f"{', '.join(SUITES)}, or {_SUITE}")
+    return _suite(name, found)
+
+
+def _suite(name: str, found: Any) -> Suite:
+    splits = found.items() if isinstance(found, Mapping) else ()
+    if not splits or not all(isinstance(tasks, Mapping) and tasks for _, tasks in splits):
+        raise InvalidInput("suite", f"{name} is a {type(found).__name__}", _SUITE)
+    suite = {
+        split: {f"{name}/{task}": _task(f"{name}/{task}", kind) for task, kind in tasks.items()}
+        for split, tasks in splits
+    }
+    everything = {task: kind for tasks in suite.values() for task, kind in tasks.items()}
+    return {**suite, "all": everything}
+
+
+def find_task(name: str) -> type[Task]:
+    """The task of a name: "suite/name", "module:Class", or an entry point of the group imop.tasks.
+
+    Raises:
+        InvalidInput: if there is none, or it is no task.
+    """
+    tasks = _tasks_of(name.rpartition("/")[0])
+    if name in tasks:
+        return tasks[name]
+    found = None if tasks else plugins.find("task", name, "imop.tasks")
+    if found is None:
+        raise InvalidInput("task", name, f"{_nearest(name, tasks)}, or {_TASK}")
+    return _task(name, found)
+
+
+def _tasks_of(suite: str) -> Mapping[str, type[Task]]:
+    known = suite in SUITES or plugins.find("suite", suite, "imop.suites") is not None
+    return find_suite(suite)["all"] if known else {}
+
+
+def _nearest(name: str, tasks: Mapping[str, type[Task]]) -> str:
+    known = [*tasks] or [task for suite in SUITES.values() for task in suite["all"]]
+    near = get_close_matches(name, known, n=3, cutoff=0.4) or known[:1]
+    return f"a task such as {', '.join(near)} (`imop tasks --suite` lists those of {', '.join(SUITES)})"
+
+
+def _task(name: str, found: Any) -> type[Task]:
+    if not (isinstance(found, type) and issubclass(found, Task)):
+        raise InvalidInput("task", f"{name} is {found!r}", _TASK)
+    if inspect.isabstract(found):
+        missing = ", ".join(sorted(found.__abstractmethods__))
+        raise InvalidInput("task", f"{name} does not define {missing}", _TASK)
+    return found
