@@ -60,7 +60,7 @@ def test_help_lists_the_verbs(capsys):
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (("run", "--task", "tabletop/juggle"), "tabletop/lid_off_pot"),
+        (("run", "--task", "tabletop/lid_of_pot"), "tabletop/lid_off_pot"),
         (("run", "--task", POT, "--seed", "-4"), "seed"),
         (("run", "--task", POT, "--variation", "9"), "variation"),
         (("run", "--task", POT, "--demo", "/nowhere"), "/nowhere"),
