@@ -6,19 +6,21 @@ from pathlib import Path
 import pytest
 
 SOURCE = Path(__file__).parents[1] / "src" / "imop"
-BASE = {"types", "errors", "files"}
+BASE = {"types", "errors", "extras", "files"}
 ALLOWED = {
     "errors": set(),
+    "extras": {"errors"},
     "files": set(),
     "types": {"errors"},
     "geometry": BASE,
     "demos": BASE | {"geometry"},
     "networks": BASE | {"geometry", "demos"},
     "policy": BASE | {"geometry", "demos", "networks"},
-    "sim": BASE | {"geometry"},
-    "tasks": BASE | {"geometry", "sim"},
-    "training": BASE | {"geometry", "demos", "networks", "sim"},
-    "evaluation": BASE | {"geometry", "demos", "networks", "policy", "training", "sim", "tasks"},
+    "robots": BASE | {"geometry"},
+    "sim": BASE | {"geometry", "robots"},
+    "tasks": BASE | {"geometry", "robots", "sim"},
+    "training": BASE | {"geometry", "demos", "networks", "robots", "sim"},
+    "evaluation": BASE | {"geometry", "demos", "networks", "policy", "training", "robots", "sim", "tasks"},
 }
 
 

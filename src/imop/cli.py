@@ -209,7 +209,7 @@ def check(path: Positional[Path]) -> int:
     from rich.progress import track
 
     from imop.demos.check import check as find
-    from imop.sim.robot import tip_pose
+    from imop.robots.panda import tip_pose
 
     findings = find(
         path, tip_pose=tip_pose, track=lambda these: track(these, f"checking {path}", transient=True)

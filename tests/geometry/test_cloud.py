@@ -111,7 +111,7 @@ def test_crop_is_inclusive_and_exact(rng):
 
 
 def test_farthest_points_begin_with_the_first_and_are_each_the_farthest_from_those_before(rng):
-    points = rng.normal(size=(300, 3)) + (0, 0, 5)
+    points = rng.normal(size=(300, 3)) + np.array([0, 0, 5])
     chosen = clouds.farthest_points(points, 120)
     expected = [0]
     while len(expected) < 120:

@@ -14,8 +14,8 @@ from imop.policy.matcher import Matcher
 from imop.policy.one_shot import OneShotPolicy
 from imop.policy.registration import RegistrationMatcher
 from imop.policy.textbook import TextbookMatcher
+from imop.robots.panda import panda_self_filter
 from imop.sim.kinematics import reachable
-from imop.sim.robot import panda_self_filter
 from imop.sim.world import World
 from imop.tasks.env import ImopEnv, make_env, make_task
 from imop.tasks.expert import ExpertFailed, record_demonstration
