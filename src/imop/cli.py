@@ -12,7 +12,7 @@ import tyro
 from rich.console import Console
 from tyro.conf import Positional
 
-from imop.errors import ImopError
+from imop.errors import ImopError, MissingExtra
 from imop.training.ablation import Ablation
 from imop.training.config import TrainConfig
 
@@ -231,7 +231,8 @@ def predict(
 ) -> int:
     """Predict the action at every keyframe of a recorded episode from one demonstration; nothing moves.
 
-    Writes result.json and steps.png.
+    Writes result.json and, with the extra viz, steps.png. Without the extra sim, poses that the Panda cannot
+    reach are not ruled out.
 
     Args:
         demo: the demonstration: a store or an RLBench episode, its first episode.
@@ -241,11 +242,15 @@ def predict(
         out: folder for the results.
     """
     from imop.demos.load import load_demonstrations
-    from imop.evaluation.run import predict_recorded, predictions_table
+    from imop.evaluation.predict import draw_predictions, predict_recorded, predictions_table
 
     shown, recorded = (load_demonstrations(path, 1)[0] for path in (demo, query))
     with console.status(f"predicting {query}"):
         predictions = predict_recorded(shown, recorded, method, out, weights)
+        try:
+            draw_predictions(shown, recorded, predictions, out / "steps.png")
+        except MissingExtra as error:
+            console.print(f"no steps.png: {error}", markup=False)
     console.print(predictions_table(predictions))
     for path in sorted(out.iterdir()):
         console.print(f"  {path}", highlight=False)

@@ -10,9 +10,10 @@ from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeRemainin
 
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.episodes import Episode, EpisodeLog, method_state
+from imop.evaluation.methods import make_policy
 from imop.evaluation.report import Count, Results
 from imop.evaluation.rollout import rollout
-from imop.evaluation.trials import Trial, demonstration_for, make_policy, most_actions, suite_trials
+from imop.evaluation.trials import Trial, demonstration_for, most_actions, suite_trials
 from imop.tasks.expert import perform
 from imop.tasks.layout import NoRoom
 from imop.types import Demonstration

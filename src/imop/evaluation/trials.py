@@ -1,22 +1,9 @@
 """Which scene a method is tried in, and which demonstration it was shown before."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from imop.errors import ImopError, InvalidInput
-from imop.evaluation.oracle import OraclePolicy
-from imop.evaluation.rollout import Policy
 from imop.evaluation.splits import SPLITS, chosen_tasks
-from imop.geometry.perception import Perception
-from imop.networks.model import BUNDLED
-from imop.policy.baselines import ReplayPolicy
-from imop.policy.matcher import Matcher
-from imop.policy.one_shot import OneShotPolicy
-from imop.policy.registration import RegistrationMatcher
-from imop.policy.textbook import TextbookMatcher
-from imop.robots.panda import panda_self_filter
-from imop.sim.kinematics import reachable
-from imop.sim.world import World
 from imop.tasks.env import ImopEnv, make_env, make_task
 from imop.tasks.expert import ExpertFailed, record_demonstration
 from imop.tasks.layout import NoRoom
@@ -90,38 +77,6 @@ def suite_trials(
         ]
         for name in chosen_tasks(suite, split, tasks)
     }
-
-
-def make_policy(
-    method: str, world: World | None = None, min_confidence: float = 0.0, weights: Path | None = None
-) -> Policy:
-    """A fresh policy by the name of its method.
-
-    Args:
-        method: learned, routed (learned, and the routing network chooses the step), replay, registration,
-            textbook or oracle.
-        world: the simulated world, which only the oracle reads.
-        min_confidence: of the one-shot policies.
-        weights: folder of the learned policy's weights; by default the bundled ones.
-
-    Raises:
-        InvalidInput: for an unknown method, or an oracle without a world.
-        MissingExtra: for textbook without Open3D.
-    """
-    if method == "replay":
-        return ReplayPolicy()
-    perception = Perception(panda_self_filter().is_robot)
-    if method in ("registration", "textbook"):
-        matcher: Matcher = RegistrationMatcher() if method == "registration" else TextbookMatcher()
-        return OneShotPolicy(matcher, perception, min_confidence=min_confidence, feasible=reachable)
-    if method in ("learned", "routed"):
-        return OneShotPolicy.from_pretrained(
-            weights or BUNDLED, perception, min_confidence, method == "routed", reachable
-        )
-    if method == "oracle" and world is not None:
-        return OraclePolicy(world)
-    known = "learned, routed, replay, registration, textbook, or (in simulation) oracle"
-    raise InvalidInput("method", method, known)
 
 
 def most_actions(method: str, demonstration: Demonstration, task: Task) -> int:
