@@ -38,6 +38,7 @@ def run(
     """Show the policy one demonstration of a task, then let it perform the task in another scene.
 
     Writes result.json, steps.png (demonstration, region, correspondences, predicted gripper) and rollout.mp4.
+    Needs the extras sim and viz.
 
     Args:
         task: suite and name, such as tabletop/lid_off_pot; `imop tasks` lists them.

@@ -11,6 +11,7 @@ import imop.demos
 import imop.geometry
 import imop.networks
 import imop.policy
+import imop.robots
 import imop.sim
 import imop.tasks
 from imop.errors import CorruptData
@@ -69,7 +70,7 @@ class EpisodeLog:
 
 def method_state(method: str, weights: Path | None) -> str:
     """Digest of the code that decides how a method does, and of its weights if it has some."""
-    world = code_digest(imop.sim, imop.tasks, imop.geometry)
+    world = code_digest(imop.sim, imop.robots, imop.tasks, imop.geometry)
     if method in ("expert", "oracle", "replay"):
         return world
     policy = code_digest(imop.policy, imop.networks, imop.demos)
