@@ -10,7 +10,7 @@ from imop.demos.frames import moved
 from imop.evaluation.trials import Trial, demonstration_for
 from imop.geometry import se3
 from imop.networks.model import load_model
-from imop.sim.robot import T_WORLD_BASE
+from imop.robots.panda import T_WORLD_BASE
 from imop.training.shards import write_shard
 from tests.training.test_pairs import pair
 
