@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 # One thread per process: two cores are better spent on two processes.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: install demo test lint lock clean
+.PHONY: install demo test lint wheel test-wheel test-lowest lock clean
 
 install: $(STAMP)
 
@@ -25,6 +25,25 @@ lint: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+# A source archive, and a wheel made from it.
+wheel: install
+	rm -rf dist
+	$(BIN)/python -m build --outdir dist .
+
+# The wheel in fresh environments and an empty folder.
+test-wheel: wheel
+	.ci/test_wheel $(PYTHON)
+
+# The lowest versions that pyproject.toml allows, with the tests of what uses them.
+test-lowest: install
+	mkdir -p build
+	$(BIN)/python .ci/lowest.py > build/lowest.txt
+	$(PYTHON) -m venv --clear build/lowest
+	build/lowest/bin/pip install --quiet --disable-pip-version-check -c build/lowest.txt -e '.[sim,viz,train]' \
+		hypothesis pytest pytest-xdist
+	build/lowest/bin/python -m pytest -n 2 --dist loadfile tests/demos tests/geometry tests/networks tests/policy \
+		tests/robots tests/sim tests/training tests/evaluation
 
 # Rewrites constraints.txt from what is installed now.
 lock: install

@@ -17,9 +17,10 @@ from rich.table import Table
 
 from imop.errors import ImopError
 from imop.evaluation.jobs import parallel
+from imop.evaluation.methods import make_policy
 from imop.evaluation.report import save_json
 from imop.evaluation.rollout import rollout
-from imop.evaluation.trials import Trial, demonstration_for, make_policy
+from imop.evaluation.trials import Trial, demonstration_for
 from imop.sim.parts.grocery import GROCERIES
 from imop.types import Demonstration
 

@@ -25,8 +25,8 @@ from rich.table import Table
 
 from imop.errors import ImopError, InvalidInput, NoConfidentMatch
 from imop.evaluation.cases import CaseOptions, made
+from imop.evaluation.methods import make_policy
 from imop.evaluation.open_loop import Case, ToldRouter
-from imop.evaluation.trials import make_policy
 from imop.files import replaced
 from imop.policy.one_shot import OneShotPolicy
 

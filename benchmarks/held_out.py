@@ -36,7 +36,7 @@ from imop.policy.matcher import Matcher, Transition
 from imop.policy.matcher import Scene as Seen
 from imop.policy.registration import RegistrationMatcher
 from imop.policy.textbook import TextbookMatcher
-from imop.sim.robot import panda_self_filter
+from imop.robots.panda import panda_self_filter
 from imop.training.depth_noise import DepthNoise
 from imop.training.families import HELD_OUT
 from imop.training.families.thing import revolution

@@ -28,12 +28,11 @@ from rich.table import Table
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.cases import CaseOptions, made
 from imop.evaluation.jobs import parallel
+from imop.evaluation.methods import Policy, make_policy
 from imop.evaluation.open_loop import Case, RecordedPoses, ask
 from imop.evaluation.open_loop_rows import Row, by_task
 from imop.evaluation.oracle import OraclePolicy
 from imop.evaluation.picture import Panel, save_picture
-from imop.evaluation.rollout import Policy
-from imop.evaluation.trials import make_policy
 from imop.files import replaced
 from imop.geometry.accuracy import COARSE
 from imop.types import Action

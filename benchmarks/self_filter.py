@@ -21,7 +21,7 @@ from imop.evaluation.report import save_json
 from imop.geometry.cloud import unproject
 from imop.geometry.perception import WORKSPACE_LOWER, WORKSPACE_UPPER
 from imop.geometry.self_filter import SelfFilter
-from imop.sim.robot import panda_self_filter
+from imop.robots.panda import panda_self_filter
 from imop.types import BoolArray, CameraView, FloatArray, Observation
 
 # RLBench's instance ids of the fingers, the hand and the links.

@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 
 SOURCE = Path(__file__).parents[1] / "src" / "imop"
-BASE = {"types", "errors", "files"}
+BASE = {"types", "errors", "extras", "files"}
 ALLOWED = {
     "errors": set(),
+    "extras": {"errors"},
     "files": {"errors"},
     "plugins": {"errors"},
     "types": {"errors"},
@@ -16,10 +17,12 @@ ALLOWED = {
     "demos": BASE | {"geometry"},
     "networks": BASE | {"geometry", "demos"},
     "policy": BASE | {"geometry", "demos", "networks"},
-    "sim": BASE | {"geometry"},
-    "tasks": BASE | {"geometry", "sim", "plugins"},
-    "training": BASE | {"geometry", "demos", "networks", "sim"},
-    "evaluation": BASE | {"geometry", "demos", "networks", "policy", "training", "sim", "tasks", "plugins"},
+    "robots": BASE | {"geometry"},
+    "sim": BASE | {"geometry", "robots"},
+    "tasks": BASE | {"geometry", "robots", "sim", "plugins"},
+    "training": BASE | {"geometry", "demos", "networks", "robots", "sim"},
+    "evaluation": BASE
+    | {"geometry", "demos", "networks", "policy", "training", "robots", "sim", "tasks", "plugins"},
 }
 
 

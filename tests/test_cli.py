@@ -10,7 +10,7 @@ from imop.demos.frames import moved
 from imop.evaluation.trials import Trial, demonstration_for
 from imop.geometry import se3
 from imop.networks.model import load_model
-from imop.sim.robot import T_WORLD_BASE
+from imop.robots.panda import T_WORLD_BASE
 from imop.training.shards import write_shard
 from tests.training.test_pairs import pair
 
@@ -60,7 +60,7 @@ def test_help_lists_the_verbs(capsys):
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (("run", "--task", "tabletop/juggle"), "tabletop/lid_off_pot"),
+        (("run", "--task", "tabletop/lid_of_pot"), "tabletop/lid_off_pot"),
         (("run", "--task", POT, "--seed", "-4"), "seed"),
         (("run", "--task", POT, "--variation", "9"), "variation"),
         (("run", "--task", POT, "--demo", "/nowhere"), "/nowhere"),

@@ -12,7 +12,7 @@ import pytest
 
 from imop import DemonstrationStore, Task, check_task, make_task
 from imop.errors import InvalidInput
-from imop.evaluation.trials import make_policy
+from imop.evaluation.methods import make_policy
 from imop.tasks.suites import find_suite, find_task
 
 EXAMPLES = Path(__file__).parents[1] / "examples"

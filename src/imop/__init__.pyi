@@ -6,7 +6,7 @@ from .policy.learned import LearnedMatcher
 from .policy.learned_router import LearnedRouter
 from .policy.one_shot import OneShotPolicy
 from .policy.registration import RegistrationMatcher
-from .sim.robot import panda_self_filter
+from .robots.panda import panda_self_filter
 from .tasks.check_task import check_task
 from .tasks.env import make_env, make_task, to_array, to_observation
 from .tasks.expert import record_demonstration

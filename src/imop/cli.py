@@ -16,7 +16,7 @@ from rich.status import Status
 from rich.text import Text
 from tyro.conf import Positional
 
-from imop.errors import ImopError
+from imop.errors import ImopError, MissingExtra
 from imop.files import writable_folder
 from imop.training.ablation import Ablation
 from imop.training.config import TrainConfig
@@ -62,6 +62,7 @@ def run(
     """Show the policy one demonstration of a task, then let it perform the task in another scene.
 
     Writes result.json, steps.png (demonstration, region, correspondences, predicted gripper) and rollout.mp4.
+    Needs the extras sim and viz.
 
     Args:
         task: suite and name, such as tabletop/lid_off_pot (`imop tasks` lists them), or one's own, such as
@@ -229,7 +230,7 @@ def check(path: Positional[Path]) -> int:
         path: a store, or a folder in RLBench's layout.
     """
     from imop.demos.check import check as find
-    from imop.sim.robot import tip_pose
+    from imop.robots.panda import tip_pose
 
     findings = find(path, tip_pose=tip_pose, track=lambda these: _track(these, f"checking {path}"))
     for finding in findings:
@@ -252,7 +253,8 @@ def predict(
 ) -> int:
     """Predict the action at every keyframe of a recorded episode from one demonstration; nothing moves.
 
-    Writes result.json and steps.png.
+    Writes result.json and, with the extra viz, steps.png. Without the extra sim, poses that the Panda cannot
+    reach are not ruled out.
 
     Args:
         demo: store or folder of RLBench's layout with the demonstration.
@@ -265,13 +267,20 @@ def predict(
         weights: folder that `imop train` wrote; by default the bundled weights.
         out: folder for the results.
     """
+    from imop.demos.frames import moved
     from imop.demos.load import load_demonstration
-    from imop.evaluation.run import predict_recorded, predictions_table
+    from imop.evaluation.predict import draw_predictions, frame_of, predict_recorded, predictions_table
 
     writable_folder(out)
+    T_imop_world = frame_of(base)
     shown, recorded = load_demonstration(demo, demo_episode), load_demonstration(query, query_episode)
+    shown, recorded = moved(shown, T_imop_world), moved(recorded, T_imop_world)
     with _status(f"predicting {query}"):
-        predictions = predict_recorded(shown, recorded, method, out, weights, base)
+        predictions = predict_recorded(shown, recorded, method, out, weights, T_imop_world)
+        try:
+            draw_predictions(shown, recorded, predictions, out / "steps.png")
+        except MissingExtra as error:
+            console.print(f"no steps.png: {error}")
     console.print(predictions_table(predictions))
     _list(out)
     return 0

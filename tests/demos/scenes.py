@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from imop.geometry import se3
-from imop.sim.robot import PANDA_HOME_Q, tip_pose
+from imop.robots.panda import PANDA_HOME_Q, tip_pose
 from imop.types import Action, CameraView, Demonstration, Keyframe, Observation
 
 TABLE_HEIGHT = 0.75

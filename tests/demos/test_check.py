@@ -12,7 +12,7 @@ from imop.demos.rlbench import episodes, read_episode
 from imop.demos.store import DemonstrationStore
 from imop.errors import InvalidInput
 from imop.geometry import se3
-from imop.sim.robot import tip_pose
+from imop.robots.panda import tip_pose
 from tests.demos.rlbench_files import KEYFRAMES, dump_demo, frames_of, write_episode
 from tests.demos.scenes import lift_a_cube, with_observations, with_views
 

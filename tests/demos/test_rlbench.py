@@ -11,7 +11,7 @@ from imop.demos.rlbench import CAMERAS, episodes, import_rlbench, read_episode
 from imop.demos.store import DemonstrationStore
 from imop.errors import CorruptData, InvalidInput
 from imop.geometry.cloud import unproject
-from imop.sim.robot import tip_pose
+from imop.robots.panda import tip_pose
 from tests.demos.rlbench_files import FAR, KEYFRAMES, dump_demo, frames_of, write_episode
 from tests.demos.scenes import assert_same, lift_a_cube
 from tests.demos.test_unpickle import Evil

@@ -110,6 +110,16 @@ def test_crop_is_inclusive_and_exact(rng):
     assert len(inside) == np.all(np.abs(cloud.points) <= 0.1, axis=1).sum() > 0
 
 
+def test_farthest_points_begin_with_the_first_and_are_each_the_farthest_from_those_before(rng):
+    points = rng.normal(size=(300, 3)) + np.array([0, 0, 5])
+    chosen = clouds.farthest_points(points, 120)
+    expected = [0]
+    while len(expected) < 120:
+        to_nearest = np.linalg.norm(points[:, None] - points[expected], axis=-1).min(axis=1)
+        expected.append(int(to_nearest.argmax()))
+    np.testing.assert_array_equal(chosen, expected)
+
+
 def test_farthest_points_spread_better_than_chance(rng):
     points = rng.normal(size=(2000, 3))
     chosen = clouds.farthest_points(points, 50)

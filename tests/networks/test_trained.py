@@ -59,7 +59,7 @@ def networks():
     samples = [sample(augment(pair(seed), rng)) for seed in range(8) for _ in range(2)]
     region, matching = RegionNetwork(REGION), MatchingNetwork(MATCHING)
     optimizer = torch.optim.Adam([*region.parameters(), *matching.parameters()], lr=1e-2)
-    for k in range(50):
+    for k in range(60):
         batch = collate_samples([samples[(2 * k + i) % len(samples)] for i in range(2)])
         before = batch.step.before
         stages = region(batch.step)

@@ -5,7 +5,7 @@ import pytest
 from imop.geometry.perception import Perception
 from imop.policy.one_shot import OneShotPolicy
 from imop.policy.registration import RegistrationMatcher
-from imop.sim.robot import panda_self_filter
+from imop.robots.panda import panda_self_filter
 from imop.tasks.env import make_task
 from imop.tasks.expert import record_demonstration
 

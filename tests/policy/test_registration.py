@@ -3,7 +3,7 @@
 import numpy as np
 
 from imop.demos.rlbench import read_episode
-from imop.evaluation.open_loop import predict
+from imop.evaluation.predict import predict
 from imop.geometry import se3
 from imop.policy.one_shot import OneShotPolicy
 from imop.policy.registration import RegistrationMatcher

@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from imop.geometry import se3
+from imop.robots.panda import PANDA_HOME_Q
 from imop.sim.collision import CLEARANCE, CollisionChecker, densify
 from imop.sim.gripper import attach
 from imop.sim.kinematics import inverse_kinematics
-from imop.sim.robot import PANDA_HOME_Q
 from imop.sim.world import TABLE_HEIGHT, World, allow_grasp, scene_spec
 from imop.types import FloatArray
 

@@ -6,9 +6,9 @@ import pytest
 
 from imop.errors import PlanFailed
 from imop.geometry import se3
+from imop.robots.panda import tip_pose
 from imop.sim.execute import execute, move
 from imop.sim.motion import WORKSPACE_LOWER, Planner
-from imop.sim.robot import tip_pose
 from imop.sim.world import TABLE_HEIGHT, World, allow_grasp, scene_spec
 from imop.types import Action, FloatArray
 

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from imop.geometry import se3
+from imop.robots.panda import PANDA_HOME_Q
 from imop.sim.gripper import attach, between_fingers, is_commanded_open, release, set_gripper
 from imop.sim.kinematics import inverse_kinematics
-from imop.sim.robot import PANDA_HOME_Q
 from imop.sim.world import TABLE_HEIGHT, World, allow_grasp, scene_spec
 
 DOWN = se3.euler(x=np.pi, z=np.pi)

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from imop.errors import InvalidInput
 from imop.geometry import se3
+from imop.robots.panda import JOINT_LOWER, JOINT_UPPER, PANDA_HOME_Q, tip_pose
 from imop.sim.kinematics import follow, inverse_kinematics, line, reachable, tip_and_jacobian
-from imop.sim.robot import JOINT_LOWER, JOINT_UPPER, PANDA_HOME_Q, tip_pose
 
 CONFIGURATIONS = st.integers(0, 10_000).map(
     lambda seed: np.random.default_rng(seed).uniform(JOINT_LOWER + 0.02, JOINT_UPPER - 0.02)

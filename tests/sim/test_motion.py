@@ -8,10 +8,10 @@ import pytest
 
 from imop.errors import PlanFailed
 from imop.geometry import se3
+from imop.robots.panda import JOINT_LOWER, JOINT_UPPER, PANDA_HOME_Q, tip_pose
 from imop.sim import motion
 from imop.sim.gripper import attach
 from imop.sim.motion import ACCELERATION, PERIOD, VELOCITY, Planner, Trajectory
-from imop.sim.robot import JOINT_LOWER, JOINT_UPPER, PANDA_HOME_Q, tip_pose
 from imop.sim.world import TABLE_HEIGHT, World, allow_grasp, scene_spec
 from imop.types import FloatArray
 

@@ -1,16 +1,14 @@
-import frankik
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given
 from hypothesis import strategies as st
 
-from imop.errors import InvalidInput
 from imop.geometry import se3
+from imop.robots import panda
 from imop.sim import robot
 
 JOINTS = st.tuples(
-    *(st.floats(lo, hi) for lo, hi in zip(robot.JOINT_LOWER, robot.JOINT_UPPER, strict=True))
+    *(st.floats(lo, hi) for lo, hi in zip(panda.JOINT_LOWER, panda.JOINT_UPPER, strict=True))
 ).map(np.array)
 
 # frankik's fk returns Franka's hand frame moved to its tool centre point.
@@ -24,7 +22,7 @@ def model() -> mujoco.MjModel:
 
 def tip_of(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     site = data.site("tip")
-    return robot.T_WORLD_BASE @ se3.make(site.xmat.reshape(3, 3), site.xpos)
+    return panda.T_WORLD_BASE @ se3.make(site.xmat.reshape(3, 3), site.xpos)
 
 
 def simulate(model: mujoco.MjModel, data: mujoco.MjData, seconds: float) -> None:
@@ -35,65 +33,46 @@ def simulate(model: mujoco.MjModel, data: mujoco.MjData, seconds: float) -> None
 @pytest.fixture
 def home(model: mujoco.MjModel) -> mujoco.MjData:
     data = mujoco.MjData(model)
-    data.qpos[:7] = data.ctrl[:7] = robot.PANDA_HOME_Q
-    data.qpos[7:] = data.ctrl[7:] = robot.FINGER_STROKE
+    data.qpos[:7] = data.ctrl[:7] = panda.PANDA_HOME_Q
+    data.qpos[7:] = data.ctrl[7:] = panda.FINGER_STROKE
     mujoco.mj_forward(model, data)
     return data
 
 
-@given(JOINTS)
-def test_flange_agrees_with_frankik(q):
-    T_base_flange = se3.invert(robot.T_WORLD_BASE) @ robot.link_poses(q)[-1]
-    np.testing.assert_allclose(T_base_flange, frankik.fk(q) @ se3.invert(T_FLANGE_FRANKIK_TCP), atol=1e-6)
-
-
 def test_model_agrees_with_closed_form(model, rng):
     data = mujoco.MjData(model)
-    for q in rng.uniform(robot.JOINT_LOWER, robot.JOINT_UPPER, (50, 7)):
+    for q in rng.uniform(panda.JOINT_LOWER, panda.JOINT_UPPER, (50, 7)):
         data.qpos[:7] = q
         mujoco.mj_kinematics(model, data)
-        np.testing.assert_allclose(tip_of(model, data), robot.tip_pose(q), atol=1e-6)
-
-
-def test_home_is_rlbench_start():
-    """Recorded start of RLBench's episodes (position, quaternion xyzw)."""
-    pose = se3.to_pose7(robot.tip_pose(robot.PANDA_HOME_Q))
-    np.testing.assert_allclose(pose[:3], (0.2785, -0.0082, 1.4720), atol=0.003)
-    np.testing.assert_allclose(pose[3:], (0, 0.9927, 0, 0.1209), atol=0.003)
+        np.testing.assert_allclose(tip_of(model, data), panda.tip_pose(q), atol=1e-6)
 
 
 def test_names_and_limits_are_frankas(model):
     for i, name in enumerate(robot.ARM_JOINTS):
-        np.testing.assert_allclose(model.joint(name).range, (robot.JOINT_LOWER[i], robot.JOINT_UPPER[i]))
+        np.testing.assert_allclose(model.joint(name).range, (panda.JOINT_LOWER[i], panda.JOINT_UPPER[i]))
         np.testing.assert_allclose(model.actuator(name).ctrlrange, model.joint(name).range)
-        np.testing.assert_allclose(model.actuator(name).forcerange[1], robot.JOINT_TORQUE[i])
+        np.testing.assert_allclose(model.actuator(name).forcerange[1], panda.JOINT_TORQUE[i])
     for name in robot.FINGER_JOINTS:
         np.testing.assert_allclose(model.joint(name).range, (0, 0.04))
     bodies = {model.body(i).name for i in range(model.nbody)}
     assert bodies >= {*(f"link{i}" for i in range(8)), "hand", "left_finger", "right_finger"}
 
 
-@pytest.mark.parametrize("q", [[0.0] * 6, [[0.0] * 7]])
-def test_wrong_number_of_joints_is_refused(q):
-    with pytest.raises(InvalidInput, match="q"):
-        robot.tip_pose(q)
-
-
 def test_stands_still_at_home(model, home):
     simulate(model, home, 2.0)
-    assert np.abs(home.qpos[:7] - robot.PANDA_HOME_Q).max() < 1e-4
+    assert np.abs(home.qpos[:7] - panda.PANDA_HOME_Q).max() < 1e-4
     assert home.ncon == 0
 
 
 def test_follows_its_targets(model, home):
-    target = robot.PANDA_HOME_Q + np.array([0.2, 0.1, -0.2, -0.3, 0.2, 0.2, 0.3])
+    target = panda.PANDA_HOME_Q + np.array([0.2, 0.1, -0.2, -0.3, 0.2, 0.2, 0.3])
     home.ctrl[:7] = target
     simulate(model, home, 3.0)
     assert np.abs(home.qpos[:7] - target).max() < 2e-3
 
 
 def test_fingers_close_and_open_together_on_their_sides(model, home):
-    for target in (0.0, robot.FINGER_STROKE):
+    for target in (0.0, panda.FINGER_STROKE):
         home.ctrl[7:] = target
         simulate(model, home, 0.5)
         np.testing.assert_allclose(home.qpos[7:9], target, atol=5e-4)

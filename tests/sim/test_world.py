@@ -6,7 +6,7 @@ import pytest
 
 from imop.errors import InvalidInput
 from imop.geometry import se3
-from imop.sim.robot import PANDA_HOME_Q, tip_pose
+from imop.robots.panda import PANDA_HOME_Q, tip_pose
 from imop.sim.world import TABLE_HEIGHT, World, allow_grasp, scene_spec
 
 BOX = mujoco.mjtGeom.mjGEOM_BOX

@@ -8,15 +8,18 @@ whole.
 from dataclasses import dataclass
 from functools import cache
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from imop.extras import extra
 from imop.geometry import se3
 from imop.geometry.neighbours import within
 from imop.sim.world import World
 from imop.types import BoolArray, FloatArray
+
+with extra("sim"):
+    import mujoco
 
 TOLERANCE = 0.002
 """Metres that surfaces may differ by and still look the same."""

@@ -9,9 +9,10 @@ from rich.console import Console
 from imop.errors import AssetMissing, ImopError, MissingExtra
 from imop.evaluation.episodes import Episode, EpisodeLog, method_state
 from imop.evaluation.jobs import parallel
+from imop.evaluation.methods import make_policy
 from imop.evaluation.report import Count, Results
 from imop.evaluation.rollout import rollout
-from imop.evaluation.trials import Trial, demonstration_for, make_policy, most_actions, suite_trials
+from imop.evaluation.trials import Trial, demonstration_for, most_actions, suite_trials
 from imop.tasks.expert import perform
 from imop.tasks.layout import NoRoom
 from imop.types import Demonstration

@@ -14,10 +14,11 @@ import numpy as np
 
 from imop.evaluation.appearance import Appearance
 from imop.evaluation.equal_poses import equal_poses
+from imop.evaluation.methods import make_policy
 from imop.evaluation.open_loop import region_shares
 from imop.evaluation.picture import Panel
 from imop.evaluation.rollout import Rollout, rollout
-from imop.evaluation.trials import Trial, make_policy, most_actions
+from imop.evaluation.trials import Trial, most_actions
 from imop.geometry import se3
 from imop.geometry.accuracy import COARSE, errors
 from imop.sim.world import World

@@ -4,14 +4,13 @@ import textwrap
 from pathlib import Path
 
 from joblib import delayed
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from imop.errors import InvalidInput
 from imop.evaluation.jobs import parallel
+from imop.extras import extra
 from imop.files import replaced
 from imop.sim.cameras import look_at, render_view
 from imop.tasks.env import make_task
@@ -32,7 +31,11 @@ def save_contact_sheet(tasks: list[str], path: Path, jobs: int, console: Console
     Raises:
         InvalidInput: for an unknown task, or if `path` does not end in .png.
         NoRoom: if a scene could not be laid out.
+        MissingExtra: without Matplotlib.
     """
+    with extra("viz"):
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
     if path.suffix != ".png":
         raise InvalidInput("contact-sheet", str(path), "a file name that ends in .png")
     scenes = [(task, _variation(task, column), column) for task in tasks for column in range(SCENES)]

@@ -11,11 +11,13 @@ import imop.demos
 import imop.geometry
 import imop.networks
 import imop.policy
+import imop.robots
 import imop.sim
 import imop.tasks
 from imop.errors import CorruptData
 from imop.evaluation.fingerprint import code_digest, own_code_digest, weights_digest
-from imop.evaluation.trials import METHODS, Trial, find_method
+from imop.evaluation.methods import METHODS, find_method
+from imop.evaluation.trials import Trial
 from imop.networks.model import BUNDLED
 from imop.tasks.suites import find_task
 
@@ -70,7 +72,7 @@ class EpisodeLog:
 
 def method_state(method: str, weights: Path | None, task: str) -> str:
     """Digest of the code that decides how a method does in a task, and of its weights if it has some."""
-    digests = [code_digest(imop.sim, imop.tasks, imop.geometry)]
+    digests = [code_digest(imop.sim, imop.robots, imop.tasks, imop.geometry)]
     if method not in ("expert", "oracle", "replay"):
         digests.append(code_digest(imop.policy, imop.networks, imop.demos))
     if method in ("learned", "routed"):

@@ -13,12 +13,12 @@ import numpy as np
 from imop.errors import NoConfidentMatch
 from imop.evaluation.appearance import Appearance
 from imop.evaluation.equal_poses import equal_poses
+from imop.evaluation.methods import Policy
 from imop.evaluation.open_loop_rows import Row
 from imop.evaluation.oracle import OraclePolicy
-from imop.evaluation.rollout import Policy
 from imop.geometry import cloud as clouds
 from imop.geometry import se3
-from imop.geometry.accuracy import COARSE, FINE, errors
+from imop.geometry.accuracy import COARSE, errors
 from imop.geometry.neighbours import nearest, within
 from imop.geometry.perception import WORKSPACE_LOWER, WORKSPACE_UPPER
 from imop.policy.matcher import Scene, Transition
@@ -30,54 +30,6 @@ THINNED = 0.005
 """Metres between the points that regions are compared on."""
 COVERED = 0.01
 """A point of the object is in the region if the region has a point this near, metres."""
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """One predicted action beside the recorded one.
-
-    Attributes:
-        step: number of the recorded keyframe.
-        action: what the policy predicted.
-        position_error: metres to the recorded gripper position.
-        rotation_error: radians to the recorded gripper orientation.
-        seconds: time to decide.
-    """
-
-    step: int
-    action: Action
-    position_error: float
-    rotation_error: float
-    seconds: float
-
-    @property
-    def within_1cm_5deg(self) -> bool:
-        """Whether the prediction is near enough for most grasps."""
-        return bool(self.position_error < FINE[0] and self.rotation_error < np.radians(FINE[1]))
-
-
-def predict(policy: Policy, recorded: Demonstration) -> list[Prediction]:
-    """Ask the policy, which has watched another demonstration, for the action at every recorded keyframe.
-
-    Raises:
-        ImopError: as the policy does.
-    """
-    policy.reset()
-    predictions = []
-    for step, keyframe in enumerate(recorded.keyframes):
-        started = time.perf_counter()
-        action = policy.act(keyframe.observation.stripped())
-        seconds = time.perf_counter() - started
-        predictions.append(
-            Prediction(
-                step,
-                action,
-                float(se3.translation_distance(action.T_world_gripper, keyframe.action.T_world_gripper)),
-                float(se3.rotation_distance(action.T_world_gripper, keyframe.action.T_world_gripper)),
-                seconds,
-            )
-        )
-    return predictions
 
 
 class ToldRouter:

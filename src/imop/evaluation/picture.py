@@ -4,17 +4,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
 
+from imop.extras import extra
 from imop.files import replaced
 from imop.geometry import cloud as clouds
 from imop.geometry import se3
 from imop.geometry.perception import WORKSPACE_LOWER, WORKSPACE_UPPER
 from imop.types import Action, FloatArray, Keyframe, Observation
+
+with extra("viz"):
+    import matplotlib
+    from matplotlib.axes import Axes
+    from matplotlib.collections import LineCollection
+    from matplotlib.figure import Figure
 
 REGION_COLOR = "#12a150"
 MATCH_COLOR = "#d62728"

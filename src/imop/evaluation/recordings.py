@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+import imop.robots
 import imop.sim
 import imop.tasks
 from imop.demos.store import DemonstrationStore
@@ -30,7 +31,7 @@ class Recordings:
     """
 
     def __init__(self, folder: Path):
-        path = folder / f"recordings-{code_digest(imop.sim, imop.tasks)}"
+        path = folder / f"recordings-{code_digest(imop.sim, imop.robots, imop.tasks)}"
         self._failed = path / "failed"
         try:
             self._store = DemonstrationStore.open(path / "demos.zarr")

@@ -3,25 +3,12 @@
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from typing import Protocol
 
 from imop.errors import NoConfidentMatch
+from imop.evaluation.methods import Policy
 from imop.geometry.accuracy import errors
 from imop.tasks.env import ImopEnv, to_array
-from imop.types import Action, Demonstration, FloatArray, Observation
-
-
-class Policy(Protocol):
-    """What can be rolled out: shown demonstrations, then asked for actions."""
-
-    def watch(self, demonstration: Demonstration) -> None:
-        """Remember one demonstration."""
-
-    def reset(self) -> None:
-        """Begin a new episode."""
-
-    def act(self, observation: Observation) -> Action:
-        """The next action."""
+from imop.types import Action, FloatArray, Observation
 
 
 @dataclass(frozen=True)

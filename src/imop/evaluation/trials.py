@@ -1,25 +1,9 @@
 """Which scene a method is tried in, and which demonstration it was shown before."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import cast
 
-from imop import plugins
 from imop.errors import ImopError, InvalidInput
-from imop.evaluation.oracle import OraclePolicy
-from imop.evaluation.rollout import Policy
 from imop.evaluation.splits import chosen_tasks
-from imop.geometry.perception import Perception
-from imop.networks.model import BUNDLED
-from imop.policy.baselines import ReplayPolicy
-from imop.policy.matcher import Matcher
-from imop.policy.one_shot import OneShotPolicy
-from imop.policy.registration import RegistrationMatcher
-from imop.policy.textbook import TextbookMatcher
-from imop.sim.kinematics import reachable
-from imop.sim.robot import panda_self_filter
-from imop.sim.world import World
 from imop.tasks.env import ImopEnv, make_env, make_task
 from imop.tasks.expert import ExpertFailed, record_demonstration
 from imop.tasks.layout import NoRoom
@@ -30,12 +14,6 @@ from imop.types import Demonstration
 DEMONSTRATION_SEED = 1_000_000
 """Demonstrations are recorded in scenes of this seed and above, and never tested there."""
 _RECORDING_ATTEMPTS = 20
-
-METHODS = ("replay", "textbook", "registration", "learned", "routed", "oracle", "expert")
-_METHOD = (
-    "what makes, called without arguments, an object with watch, reset and act, named module:object or by an "
-    "entry point imop.methods"
-)
 
 
 @dataclass(frozen=True)
@@ -107,56 +85,6 @@ def suite_trials(
         ]
         for name in chosen_tasks(suite, split, tasks)
     }
-
-
-def make_policy(
-    method: str, world: World | None = None, min_confidence: float = 0.0, weights: Path | None = None
-) -> Policy:
-    """A fresh policy by the name of its method.
-
-    Args:
-        method: learned, routed (learned, and the routing network chooses the step), replay, registration,
-            textbook, oracle, or one's own: "module:object", or an entry point of the group imop.methods. The
-            object makes a `Policy` when it is called without arguments.
-        world: the simulated world, which only the oracle reads.
-        min_confidence: of the one-shot policies.
-        weights: folder of the learned policy's weights; by default the bundled ones.
-
-    Raises:
-        InvalidInput: for an unknown method, what makes no policy, or an oracle without a world.
-        MissingExtra: for textbook without Open3D.
-    """
-    if method == "replay":
-        return ReplayPolicy()
-    perception = Perception(panda_self_filter().is_robot)
-    if method in ("registration", "textbook"):
-        matcher: Matcher = RegistrationMatcher() if method == "registration" else TextbookMatcher()
-        return OneShotPolicy(matcher, perception, min_confidence=min_confidence, feasible=reachable)
-    if method in ("learned", "routed"):
-        return OneShotPolicy.from_pretrained(
-            weights or BUNDLED, perception, min_confidence, method == "routed", reachable
-        )
-    if method == "oracle" and world is not None:
-        return OraclePolicy(world)
-    policy = find_method(method)()
-    if not all(callable(getattr(policy, name, None)) for name in ("watch", "reset", "act")):
-        raise InvalidInput("method", f"{method} makes a {type(policy).__name__}", _METHOD)
-    return cast(Policy, policy)
-
-
-def find_method(name: str) -> Callable[[], object]:
-    """What makes the policy of a method of one's own.
-
-    Raises:
-        InvalidInput: if there is none, or it cannot be called.
-    """
-    factory = plugins.find("method", name, "imop.methods")
-    if factory is None:
-        raise InvalidInput("method", name, f"{', '.join(METHODS)} (some only in simulation), or {_METHOD}")
-    if not callable(factory):
-        raise InvalidInput("method", f"{name} is a {type(factory).__name__}", _METHOD)
-    made: Callable[[], object] = factory
-    return made
 
 
 def most_actions(method: str, demonstration: Demonstration, task: Task) -> int:

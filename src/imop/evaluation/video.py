@@ -4,11 +4,13 @@ from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 
-import av
-
 from imop.errors import InvalidInput
+from imop.extras import extra
 from imop.files import replaced
 from imop.types import ByteArray
+
+with extra("viz"):
+    import av
 
 
 def save_video(frames: Sequence[ByteArray], path: Path, frames_per_second: int = 20) -> None:

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import fpsample
 import numpy as np
 import small_gicp
 from numpy.typing import NDArray
@@ -211,11 +210,24 @@ def grid_cells(cells: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.
 
 
 def farthest_points(points: FloatArray, count: int) -> NDArray[np.int64]:
-    """Indices (min(count, N),) of a well-spread subset of `points` (N, 3), beginning with the first point."""
+    """Indices (min(count, N),) of a well-spread subset of `points` (N, 3).
+
+    It begins with the first point; each further one is the farthest from all before it.
+    """
     if count >= len(points):
         return np.arange(len(points))
-    chosen = fpsample.bucket_fps_kdline_sampling(points.astype(np.float32), count, h=5, start_idx=0)
-    return np.asarray(chosen, dtype=np.int64)
+    p = points - points.mean(axis=0)
+    squared, ones = np.einsum("ij,ij->i", p, p)[:, None], np.ones((len(p), 1))
+    # |p - c|^2 = (p, |p|^2, 1) . (-2 c, 1, |c|^2): one product per chosen point.
+    lifted = np.asfortranarray(np.hstack([p, squared, ones]))
+    centres = np.hstack([-2 * p, ones, squared])
+    distance, to_newest = np.full(len(p), np.inf), np.empty(len(p))
+    chosen = np.zeros(count, dtype=np.int64)
+    for i in range(1, count):
+        np.dot(lifted, centres[chosen[i - 1]], out=to_newest)
+        np.minimum(distance, to_newest, out=distance)
+        chosen[i] = distance.argmax()
+    return chosen
 
 
 def estimate_normals(

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from imop.geometry import se3
-from imop.sim.robot import FINGER_STROKE
+from imop.robots.panda import FINGER_STROKE
 from imop.sim.world import ATTACH_VOLUME, GRASP, ROBOT, World
 
 PERIOD_STEPS = 25

@@ -5,22 +5,20 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from imop.geometry import se3
-from imop.sim.robot import JOINT_LOWER, JOINT_UPPER, PANDA_HOME_Q, T_FLANGE_TIP, T_WORLD_BASE, link_poses
+from imop.robots.panda import (
+    JOINT_LOWER,
+    JOINT_UPPER,
+    PANDA_HOME_Q,
+    T_FLANGE_TIP,
+    T_LINK7_FLANGE,
+    T_LINK_JOINT,
+    T_WORLD_BASE,
+)
 from imop.types import FloatArray, as_pose
 
 _SAMPLES, _INTERVAL_DEGREES = 120, 330
 _POSITION_TOLERANCE, _ROTATION_TOLERANCE = 1e-5, 1e-4
 _NEWTON_STEPS, _DAMPING = 12, 1e-3
-
-
-def _fixed_parts() -> FloatArray:
-    """(8, 4, 4): from each link's frame to the next joint's, the last from link 7 to the flange."""
-    at_zero = link_poses(np.zeros(7))
-    before = np.concatenate([np.eye(4)[None], at_zero[:-1]])
-    return se3.invert(before) @ at_zero
-
-
-_FIXED = _fixed_parts()
 
 
 def inverse_kinematics(
@@ -97,13 +95,13 @@ def _newton(q: FloatArray, T: FloatArray) -> FloatArray | None:
 
 def tip_and_jacobian(q: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Tip pose (4, 4) and its Jacobian (6, 7): linear, then angular velocity, world frame."""
-    T, axes, origins = np.eye(4), [], []
-    for fixed, angle in zip(_FIXED[:7], q, strict=True):
+    T, axes, origins = T_WORLD_BASE, [], []
+    for fixed, angle in zip(T_LINK_JOINT, q, strict=True):
         c, s = np.cos(angle), np.sin(angle)
         T = T @ fixed
         T[:3, :2] = np.stack([c * T[:3, 0] + s * T[:3, 1], c * T[:3, 1] - s * T[:3, 0]], axis=1)
         axes.append(T[:3, 2])
         origins.append(T[:3, 3])
-    T = T @ _FIXED[7] @ T_FLANGE_TIP
+    T = T @ T_LINK7_FLANGE @ T_FLANGE_TIP
     z, arms = np.stack(axes), T[:3, 3] - np.stack(origins)
     return T, np.concatenate([np.cross(z, arms), z], axis=1).T

@@ -17,9 +17,9 @@ from ompl import base, geometric, util
 
 from imop.errors import PlanFailed
 from imop.geometry import se3
+from imop.robots.panda import JOINT_LOWER, JOINT_UPPER, JOINT_VELOCITY, tip_pose
 from imop.sim.collision import CollisionChecker, densify
 from imop.sim.kinematics import follow, inverse_kinematics, line
-from imop.sim.robot import JOINT_LOWER, JOINT_UPPER, JOINT_VELOCITY, tip_pose
 from imop.sim.world import World
 from imop.types import FloatArray, as_pose
 

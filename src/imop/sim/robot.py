@@ -1,47 +1,30 @@
-"""The Panda with its hand, built from published numbers, and its forward kinematics.
+"""The Panda with its hand as a MuJoCo model, built from published numbers.
 
-Kinematics, limits and shapes are Franka's; masses and inertias are the identified ones of Gaz et al. (2019).
-The hand sits as in RLBench: the fingers are centred at the tip, the hand body is 2 mm beside it.
+Kinematics, limits and shapes are those of `robots/panda.py`; masses and inertias are the identified ones of
+Gaz et al. (2019).
 """
 
 import mujoco
 import numpy as np
 
 from imop.geometry import se3
-from imop.geometry.self_filter import SelfFilter
-from imop.sim.panda_shell import SHELLS
-from imop.types import FloatArray, as_array
+from imop.robots.panda import (
+    FINGER_STROKE,
+    JOINT_LOWER,
+    JOINT_TORQUE,
+    JOINT_UPPER,
+    T_FINGER_OTHER,
+    T_FLANGE_HAND,
+    T_FLANGE_TIP,
+    T_HAND_FINGER,
+    T_LINK7_FLANGE,
+    T_LINK_JOINT,
+)
+from imop.robots.panda_shell import SHELLS
+from imop.types import FloatArray
 
 ARM_JOINTS = tuple(f"joint{i}" for i in range(1, 8))
 FINGER_JOINTS = ("finger_joint1", "finger_joint2")
-FINGER_STROKE = 0.04
-"""How far each finger moves, metres."""
-
-JOINT_LOWER = np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973])
-JOINT_UPPER = np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973])
-JOINT_VELOCITY = np.array([2.1750, 2.1750, 2.1750, 2.1750, 2.6100, 2.6100, 2.6100])
-JOINT_ACCELERATION = np.array([15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0])
-JOINT_TORQUE = np.array([87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0])
-
-RLBENCH_JOINT4_OFFSET = 0.0698
-"""Added to RLBench's joint 4 it gives Franka's, radians."""
-
-PANDA_HOME_Q = np.radians([0.0, 10.0, 0.0, -50.0, 0.0, 70.0, 45.0]) + RLBENCH_JOINT4_OFFSET * np.eye(7)[3]
-"""Start configuration of RLBench in Franka's convention."""
-
-T_WORLD_BASE = se3.make(p=(-0.2680, -0.0064, 0.7500))
-T_FLANGE_HAND = se3.make(se3.euler(z=-np.pi / 4), (0.0014, 0.0014, -0.0023))
-"""RLBench's hand sits 2 mm beside and 2.3 mm behind Franka's; relative to it the fingers are Franka's."""
-T_FLANGE_TIP = se3.make(se3.euler(z=3 * np.pi / 4), (0.0014, 0.0014, 0.1099))
-"""To RLBench's tip: between the finger ends, +z the approach direction, +y the closing direction."""
-
-_FLANGE = 0.107
-_FINGER_BASE = 0.0584
-
-# Modified Denavit-Hartenberg: x rotation and x translation before the joint, z translation with it.
-_ALPHA = np.array([0.0, -np.pi / 2, np.pi / 2, np.pi / 2, -np.pi / 2, np.pi / 2, np.pi / 2])
-_A = np.array([0.0, 0.0, 0.0, 0.0825, -0.0825, 0.0, 0.088])
-_D = np.array([0.333, 0.0, 0.316, 0.0, 0.384, 0.0, 0.0])
 
 _MASS = {
     "link0": 0.629769,
@@ -91,16 +74,6 @@ _DAMPING = _STIFFNESS / 10
 _FINGER_STIFFNESS, _FINGER_DAMPING, _FINGER_FORCE = 4000.0, 20.0, 20.0
 _FINGER_FRICTION = 80.0  # with the force limit it bounds the speed to RLBench's 0.2 m/s or so
 
-# Around the fingers is what they hold; the lower links, several millimetres off in RLBench, touch nothing.
-_FILTER_MARGIN = {
-    "": 0.008,
-    "link0": 0.015,
-    "link1": 0.012,
-    "link2": 0.012,
-    "left_finger": 0.0012,
-    "right_finger": 0.0012,
-}
-
 # Shapes that overlap at rest although their bodies are not neighbours in MuJoCo's sense.
 _IGNORED_PAIRS = (
     ("link0", "link1"),
@@ -112,27 +85,6 @@ _IGNORED_PAIRS = (
     ("link5", "link7"),
     ("left_finger", "right_finger"),
 )
-
-
-def link_poses(q: FloatArray) -> FloatArray:
-    """Poses (8, 4, 4) of the seven link frames and the flange in the world, for joints `q` (7,) radians."""
-    q = as_array("q", q, (7,))
-    T, poses = T_WORLD_BASE, []
-    for alpha, a, d, angle in zip(_ALPHA, _A, _D, q, strict=True):
-        T = T @ se3.make(se3.euler(x=alpha), (a, 0, 0)) @ se3.make(se3.euler(z=angle), (0, 0, d))
-        poses.append(T)
-    poses.append(T @ se3.make(p=(0, 0, _FLANGE)))
-    return np.stack(poses)
-
-
-def tip_pose(q: FloatArray) -> FloatArray:
-    """T_world_gripper (4, 4) for joints `q` (7,), radians in Franka's convention.
-
-    Raises:
-        InvalidInput: if `q` does not have seven entries.
-    """
-    T: FloatArray = link_poses(q)[-1] @ T_FLANGE_TIP
-    return T
 
 
 def panda_spec() -> mujoco.MjSpec:
@@ -151,27 +103,19 @@ def panda_spec() -> mujoco.MjSpec:
     spec.option.impratio = 10
     body = _add_body(spec.worldbody, "link0", np.eye(4))
     for i, name in enumerate(ARM_JOINTS):
-        T = se3.make(se3.euler(x=_ALPHA[i]), (_A[i], 0, 0)) @ se3.make(p=(0, 0, _D[i]))
-        body = _add_body(body, f"link{i + 1}", T)
+        body = _add_body(body, f"link{i + 1}", T_LINK_JOINT[i])
         joint = body.add_joint(
             name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=(0, 0, 1), damping=1, armature=0.1
         )
         limits = (JOINT_LOWER[i], JOINT_UPPER[i])
         joint.range = limits
         _add_actuator(spec, name, _STIFFNESS[i], _DAMPING[i], JOINT_TORQUE[i], limits)
-    T_link7_flange = se3.make(p=(0, 0, _FLANGE))
-    hand = _add_body(body, "hand", T_link7_flange @ T_FLANGE_HAND)
+    hand = _add_body(body, "hand", T_LINK7_FLANGE @ T_FLANGE_HAND)
     _add_tip(hand)
     _add_fingers(spec, hand)
     for first, second in _IGNORED_PAIRS:
         spec.add_exclude(bodyname1=first, bodyname2=second)
     return spec
-
-
-def panda_self_filter() -> SelfFilter:
-    """The filter that knows the Panda's points in a scene with its base at `T_WORLD_BASE`."""
-    model = panda_spec().compile()
-    return SelfFilter(model, ARM_JOINTS, FINGER_JOINTS, T_WORLD_BASE, _FILTER_MARGIN)
 
 
 def _add_body(parent: mujoco.MjsBody, name: str, T_parent_body: FloatArray) -> mujoco.MjsBody:
@@ -193,11 +137,8 @@ def _add_tip(hand: mujoco.MjsBody) -> None:
 
 def _add_fingers(spec: mujoco.MjSpec, hand: mujoco.MjsBody) -> None:
     """finger_joint1 on the hand's +y side, which is the -y side of the tip; the second mirrors the first."""
-    T_hand_finger = se3.make(p=(0, 0, _FINGER_BASE))
-    turned = se3.make(se3.euler(z=np.pi))
-    for name, body_name, T in zip(
-        FINGER_JOINTS, ("left_finger", "right_finger"), (T_hand_finger, T_hand_finger @ turned), strict=True
-    ):
+    places = (T_HAND_FINGER, T_HAND_FINGER @ T_FINGER_OTHER)
+    for name, body_name, T in zip(FINGER_JOINTS, ("left_finger", "right_finger"), places, strict=True):
         finger = _add_body(hand, body_name, T)
         joint = finger.add_joint(
             name=name,

@@ -12,8 +12,9 @@ import numpy as np
 
 from imop.errors import InvalidInput
 from imop.geometry import se3
+from imop.robots.panda import FINGER_STROKE, PANDA_HOME_Q, T_WORLD_BASE
 from imop.sim.pictures import MeshPicture, find_pictures
-from imop.sim.robot import FINGER_STROKE, PANDA_HOME_Q, T_WORLD_BASE, panda_spec
+from imop.sim.robot import panda_spec
 from imop.types import FloatArray, IntArray, as_pose
 
 TABLE_HEIGHT = 0.75

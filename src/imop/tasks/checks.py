@@ -6,9 +6,9 @@ import numpy as np
 
 from imop.errors import PlanFailed
 from imop.geometry import se3
+from imop.robots.panda import PANDA_HOME_Q
 from imop.sim.kinematics import inverse_kinematics
 from imop.sim.motion import Planner
-from imop.sim.robot import PANDA_HOME_Q
 from imop.sim.world import World
 from imop.tasks.waypoint import Waypoint
 from imop.types import FloatArray

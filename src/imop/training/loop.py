@@ -17,13 +17,12 @@ from typing import Any
 
 import torch
 import tyro
-from lightning_fabric import Fabric
 from rich.console import Console
 from torch import Tensor, nn
 from torch.optim.swa_utils import AveragedModel
-from torch.utils.tensorboard import SummaryWriter
 
 from imop.errors import CorruptData, InvalidInput
+from imop.extras import extra
 from imop.files import replaced
 from imop.networks.model import NETWORKS, Model, ModelConfig, part_of, save_model
 from imop.training.config import TrainConfig
@@ -33,6 +32,10 @@ from imop.training.objective import Objective
 from imop.training.pairs import PairBatch
 from imop.training.progress import TrainingProgress
 from imop.training.route_batch import RouteBatch
+
+with extra("train"):
+    from lightning_fabric import Fabric
+    from torch.utils.tensorboard import SummaryWriter
 
 CHECKPOINT = "checkpoint.pt"
 LOG = "log.jsonl"

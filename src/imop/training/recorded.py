@@ -18,7 +18,7 @@ from imop.errors import InvalidInput
 from imop.geometry.cloud import PointCloud
 from imop.geometry.perception import Perception, RobotMask
 from imop.networks.graph import thin
-from imop.sim.robot import panda_self_filter
+from imop.robots.panda import panda_self_filter
 from imop.training.pairs import StepPair
 from imop.training.shards import write_shard
 from imop.training.stage import STORED

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from imop.geometry import se3
-from imop.sim.robot import PANDA_HOME_Q
+from imop.robots.panda import PANDA_HOME_Q
 from imop.training import steps
 from imop.training.families.thing import Family, Thing
 from imop.training.stage import Stage, State, Unreachable, above_table

@@ -3,22 +3,25 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import mujoco
 import numpy as np
 
 from imop.errors import ImopError
+from imop.extras import extra
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud
 from imop.geometry.perception import Perception
 from imop.networks.graph import GraphConfig, thin
+from imop.robots.panda import FINGER_STROKE, PANDA_HOME_Q, panda_self_filter
 from imop.sim.cameras import CAMERAS, Camera, observe
 from imop.sim.kinematics import inverse_kinematics
 from imop.sim.parts.shapes import add_to
-from imop.sim.robot import FINGER_STROKE, PANDA_HOME_Q, panda_self_filter
 from imop.sim.world import TABLE_HEIGHT, World, scene_spec
 from imop.training.depth_noise import DepthNoise
 from imop.training.families.thing import Thing
 from imop.types import FloatArray, Observation
+
+with extra("sim"):
+    import mujoco
 
 STORED = GraphConfig(voxel=0.007, plane_voxel=0.03, max_points=1500)
 """Clouds are stored about twice as dense as networks see them."""

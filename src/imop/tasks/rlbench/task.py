@@ -10,9 +10,9 @@ import numpy as np
 
 from imop.errors import PlanFailed
 from imop.geometry import se3
+from imop.robots.panda import PANDA_HOME_Q
 from imop.sim.kinematics import inverse_kinematics
 from imop.sim.motion import INSIDE, WORKSPACE_LOWER, Planner
-from imop.sim.robot import PANDA_HOME_Q
 from imop.sim.world import ROBOT, World
 from imop.tasks.checks import settle, touched
 from imop.tasks.coppelia.convert import add_model

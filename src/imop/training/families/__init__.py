@@ -1,5 +1,10 @@
 """Families of procedural things. The novel tasks' kinds of things are apart, for testing only."""
 
+from imop.extras import extra
+
+with extra("sim"):
+    import mujoco  # noqa: F401
+
 from imop.training.families import (
     cabinets,
     cables,

@@ -1,0 +1,96 @@
+"""Policies by the names of their methods."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol, cast
+
+from imop import plugins
+from imop.errors import InvalidInput, MissingExtra
+from imop.evaluation.oracle import OraclePolicy, Poses
+from imop.geometry.perception import Perception
+from imop.networks.model import BUNDLED
+from imop.policy.baselines import ReplayPolicy
+from imop.policy.matcher import Matcher
+from imop.policy.one_shot import OneShotPolicy
+from imop.policy.registration import RegistrationMatcher
+from imop.policy.textbook import TextbookMatcher
+from imop.robots.panda import panda_self_filter
+from imop.types import Action, Demonstration, FloatArray, Observation
+
+METHODS = ("replay", "textbook", "registration", "learned", "routed", "oracle", "expert")
+_OWN = (
+    "what makes, called without arguments, an object with watch, reset and act, named module:object or by an "
+    "entry point imop.methods"
+)
+
+
+class Policy(Protocol):
+    """What can be rolled out: shown demonstrations, then asked for actions."""
+
+    def watch(self, demonstration: Demonstration) -> None:
+        """Remember one demonstration."""
+
+    def reset(self) -> None:
+        """Begin a new episode."""
+
+    def act(self, observation: Observation) -> Action:
+        """The next action."""
+
+
+def make_policy(
+    method: str, world: Poses | None = None, min_confidence: float = 0.0, weights: Path | None = None
+) -> Policy:
+    """A fresh policy by the name of its method.
+
+    Args:
+        method: learned, routed (learned, and the routing network chooses the step), replay, registration,
+            textbook, oracle, or one's own: "module:object", or an entry point of the group imop.methods. The
+            object makes a `Policy` when it is called without arguments.
+        world: the simulated world, which only the oracle reads.
+        min_confidence: of the one-shot policies.
+        weights: folder of the learned policy's weights; by default the bundled ones.
+
+    Raises:
+        InvalidInput: for an unknown method, what makes no policy, or an oracle without a world.
+        MissingExtra: for textbook without Open3D.
+    """
+    if method == "replay":
+        return ReplayPolicy()
+    perception, reachable = Perception(panda_self_filter().is_robot), _reachable()
+    if method in ("registration", "textbook"):
+        matcher: Matcher = RegistrationMatcher() if method == "registration" else TextbookMatcher()
+        return OneShotPolicy(matcher, perception, min_confidence=min_confidence, feasible=reachable)
+    if method in ("learned", "routed"):
+        return OneShotPolicy.from_pretrained(
+            weights or BUNDLED, perception, min_confidence, method == "routed", reachable
+        )
+    if method == "oracle" and world is not None:
+        return OraclePolicy(world)
+    policy = find_method(method)()
+    if not all(callable(getattr(policy, name, None)) for name in ("watch", "reset", "act")):
+        raise InvalidInput("method", f"{method} makes a {type(policy).__name__}", _OWN)
+    return cast(Policy, policy)
+
+
+def find_method(name: str) -> Callable[[], object]:
+    """What makes the policy of a method of one's own.
+
+    Raises:
+        InvalidInput: if there is none, or it cannot be called.
+    """
+    factory = plugins.find("method", name, "imop.methods")
+    if factory is None:
+        raise InvalidInput("method", name, f"{', '.join(METHODS)} (some only in simulation), or {_OWN}")
+    if not callable(factory):
+        raise InvalidInput("method", f"{name} is a {type(factory).__name__}", _OWN)
+    made: Callable[[], object] = factory
+    return made
+
+
+def _reachable() -> Callable[[FloatArray], bool] | None:
+    """Whether the Panda reaches a pose; None without its inverse kinematics, then no pose is ruled out."""
+    try:
+        from imop.sim.kinematics import reachable
+    except MissingExtra:
+        return None
+    return reachable
