@@ -1,0 +1,60 @@
+import pytest
+from joblib.externals.loky import get_reusable_executor
+from rich.console import Console
+
+from imop.errors import InvalidInput, MissingExtra
+from imop.evaluation.benchmark import evaluate_suite
+from imop.evaluation.episodes import read_episodes
+
+MODULE = """
+from imop.errors import InvalidInput, MissingExtra
+
+class Policy:
+    def watch(self, demonstration):
+        pass
+
+    def reset(self):
+        pass
+
+class Lacking(Policy):
+    def act(self, observation):
+        raise MissingExtra("open3d", "baselines")
+
+class Lost(Policy):
+    def act(self, observation):
+        raise InvalidInput("observation", "nothing to see", "something")
+"""
+
+
+@pytest.fixture
+def evaluated(tmp_path, monkeypatch):
+    """Tries methods of a module in a folder in which the workers begin."""
+    (tmp_path / "no_help.py").write_text(MODULE)
+    monkeypatch.chdir(tmp_path)
+    get_reusable_executor().shutdown()
+
+    def evaluate(method, jobs=2):
+        choice = ("tabletop", "all", ("lid_off_pot",), [f"no_help:{method}"], 1, 0, 0, jobs)
+        results = evaluate_suite(*choice, Console(quiet=True), tmp_path / "episodes.jsonl")
+        return results, list(read_episodes(tmp_path / "episodes.jsonl"))
+
+    yield evaluate
+    get_reusable_executor().shutdown()
+
+
+def test_an_extra_that_a_worker_misses_ends_the_run_and_is_no_failed_episode(evaluated, tmp_path):
+    with pytest.raises(MissingExtra, match=r"imop\[baselines\]"):
+        evaluated("Lacking")
+    assert list(read_episodes(tmp_path / "episodes.jsonl")) == []
+
+
+def test_what_a_policy_cannot_handle_it_has_failed_at(evaluated):
+    results, (episode,) = evaluated("Lost")
+    assert episode.success is False and "nothing to see" in episode.reason
+    assert results.average("no_help:Lost") == 0
+
+
+@pytest.mark.parametrize("jobs", [0, -2])
+def test_less_than_one_process_is_refused(evaluated, jobs):
+    with pytest.raises(InvalidInput, match="jobs"):
+        evaluated("Lost", jobs)
