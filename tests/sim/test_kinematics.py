@@ -50,7 +50,7 @@ def farthest(T: np.ndarray, direction: np.ndarray) -> np.ndarray:
 
 
 @given(CONFIGURATIONS, st.integers(0, 10_000))
-def test_a_tenth_of_a_millimetre_inside_the_edge_of_the_workspace_is_reached(q: np.ndarray, seed: int) -> None:
+def test_a_tenth_of_a_millimetre_inside_the_workspace_is_reached(q: np.ndarray, seed: int) -> None:
     direction = np.random.default_rng(seed).normal(size=3)
     direction /= np.linalg.norm(direction)
     edge = farthest(tip_pose(q), direction)
