@@ -342,16 +342,20 @@ def assets(suite: Positional[Literal["rlbench"]], source: Annotated[Path, tyro.c
 
     files = [name.removeprefix(f"{suite}/") for name in RLBENCH]
     with _status(f"reading {source}"):
-        problems = install(source, files)
-    for file, problem in problems.items():
-        if problem:
-            console.print(f"{file}.ttm: {problem}", style="red")
-    missing = [file for file in files if file not in problems]
+        done = install(source, files)
+    unreadable = {file: found.error for file, found in done.items() if found.error}
+    for file, problem in unreadable.items():
+        console.print(f"{file}.ttm: {problem}", style="red")
+    missing = [file for file in files if file not in done]
     if missing:
         console.print(f"not found: {', '.join(missing)}")
+    for file, found in done.items():
+        if file not in files and not found.error:
+            remarks = "; ".join(found.lacks) or "nothing is lacking"
+            console.print(f"{file}.ttm, for a task of your own: {remarks}")
     ready = sum(task.available() for task in RLBENCH.values())
     console.print(f"{ready} of {len(files)} tasks of {suite} are available, from {folder()}")
-    return 1 if any(problems.values()) else 0
+    return 1 if unreadable else 0
 
 
 @app.command
