@@ -93,7 +93,7 @@ def views(draw):
 @st.composite
 def some_observations(draw):
     cameras = draw(st.lists(st.sampled_from("abcd"), min_size=1, max_size=3, unique=True))
-    joints = st.none() | st.lists(st.floats(allow_nan=True), max_size=8)
+    joints = st.none() | st.lists(st.floats(allow_nan=False, allow_infinity=False), max_size=8)
     return Observation(
         {name: draw(views()) for name in cameras},
         draw(poses),
