@@ -9,7 +9,7 @@ SOURCE = Path(__file__).parents[1] / "src" / "imop"
 BASE = {"types", "errors", "files"}
 ALLOWED = {
     "errors": set(),
-    "files": set(),
+    "files": {"errors"},
     "types": {"errors"},
     "geometry": BASE,
     "demos": BASE | {"geometry"},
