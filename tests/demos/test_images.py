@@ -26,9 +26,19 @@ def test_depth_is_linear_between_the_planes(tmp_path, rng):
 
 
 def test_the_far_plane_is_no_measurement(tmp_path):
-    save(tmp_path / "0.png", np.array([[2**24 - 1, 5]]))
+    save(tmp_path / "0.png", np.array([[2**24 - 1, 2**20]]))
     depth = read_depth(tmp_path / "0.png", 0.01, 4.5)
     assert depth[0, 0] == 0 and depth[0, 1] > 0
+
+
+def test_millimetres_are_refused_but_not_a_view_of_nothing(tmp_path, rng):
+    codes = rng.integers(0, 5000, (20, 30))
+    codes[0, 0] = 2**24 - 1
+    save(tmp_path / "0.png", codes)
+    with pytest.raises(CorruptData, match="look like millimetres"):
+        read_depth(tmp_path / "0.png", 0.01, 4.5)
+    save(tmp_path / "0.png", np.full((20, 30), 2**24 - 1))
+    assert not read_depth(tmp_path / "0.png", 0.01, 4.5).any()
 
 
 def test_ids_use_all_three_bytes(tmp_path, rng):
@@ -101,5 +111,5 @@ def test_other_formats_are_not_tried(tmp_path):
 def test_pointer_of_git_lfs(tmp_path):
     path = tmp_path / "0.png"
     path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n")
-    with pytest.raises(CorruptData, match="git LFS.*remedy.*git lfs pull"):
+    with pytest.raises(CorruptData, match=r"git LFS.*remedy.*git lfs pull"):
         read_rgb(path)

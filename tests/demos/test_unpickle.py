@@ -152,7 +152,7 @@ def test_forged_sizes_and_types_cost_no_memory(tmp_path, content):
 def test_pointer_of_git_lfs(tmp_path):
     path = tmp_path / "a.pkl"
     path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n")
-    with pytest.raises(CorruptData, match="git LFS.*remedy.*git lfs pull"):
+    with pytest.raises(CorruptData, match=r"git LFS.*remedy.*git lfs pull"):
         unpickle.load(path)
 
 

@@ -15,6 +15,8 @@ MOST_PIXELS = 7680 * 4320
 """More than any depth camera has; decoding as many takes 0.1 GB."""
 
 _FAR_CODE = 2**24 - 1
+# No room measures more than 65 m; as a fraction this is 0.4 % of the way from the near to the far plane.
+_MILLIMETRES = 2**16
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 # No deflated byte stands for more.
 _MOST_PER_BYTE = 1032
@@ -62,10 +64,13 @@ def read_depth(path: Path, near: float, far: float) -> Float32Array:
         far: far clipping plane, metres.
 
     Raises:
-        CorruptData: as `read_rgb`.
+        CorruptData: as `read_rgb`, and if the codes are millimetres instead of fractions.
     """
     r, g, b = np.moveaxis(read_rgb(path).astype(np.int64), -1, 0)
     code = r * 65536 + g * 256 + b
+    if np.any(code != _FAR_CODE) and code[code != _FAR_CODE].max() < _MILLIMETRES:
+        problem = f"no depth code is above {_MILLIMETRES}: they look like millimetres"
+        raise CorruptData(path, problem, f"code the fraction between the clipping planes, 0 .. {_FAR_CODE}")
     depth = near + code / _FAR_CODE * (far - near)
     return np.where(code == _FAR_CODE, 0.0, depth).astype(np.float32)
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imop.errors import CorruptData
 from imop.files import read
@@ -160,5 +159,5 @@ def _check_sizes(content: bytes) -> None:
         ValueError: if there is one.
     """
     for opcode, argument, _ in pickletools.genops(content):
-        if opcode.name.endswith("PUT") and argument > len(content):
+        if opcode.name.endswith("PUT") and argument is not None and argument > len(content):
             raise ValueError(f"object number {argument} in {len(content)} bytes")
