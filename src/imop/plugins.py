@@ -5,6 +5,7 @@ point of an installed package.
 """
 
 import importlib
+import inspect
 import os
 import sys
 from importlib.metadata import entry_points
@@ -29,6 +30,15 @@ def find(field: str, name: str, group: str) -> Any:
     for entry in entry_points(group=group, name=name):
         return _imported(field, entry.value)
     return None
+
+
+def takes_nothing(kind: Any) -> bool:
+    """Whether a class or a function can be called without arguments."""
+    try:
+        inspect.signature(kind).bind()
+    except (TypeError, ValueError):
+        return False
+    return True
 
 
 def _imported(field: str, name: str) -> Any:

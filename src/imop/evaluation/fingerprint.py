@@ -26,7 +26,7 @@ def own_code_digest(*made: Any) -> list[str]:
     """
     kinds = [kind for each in made for kind in getattr(each, "__mro__", (each,))]
     names = {getattr(kind, "__module__", "builtins").partition(".")[0] for kind in kinds}
-    modules = [sys.modules[name] for name in sorted(names - {"imop", "builtins", "abc", "typing"})]
+    modules = [sys.modules[name] for name in sorted(names - {"imop"} - sys.stdlib_module_names)]
     digest = hashlib.sha256()
     for module in modules:
         if hasattr(module, "__path__"):

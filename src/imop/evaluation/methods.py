@@ -1,5 +1,6 @@
 """Policies by the names of their methods."""
 
+import inspect
 from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol, cast
@@ -19,8 +20,8 @@ from imop.types import Action, Demonstration, FloatArray, Observation
 
 METHODS = ("replay", "textbook", "registration", "learned", "routed", "oracle", "expert")
 _OWN = (
-    "what makes, called without arguments, an object with watch, reset and act, named module:object or by an "
-    "entry point imop.methods"
+    "a class or function that makes, called without arguments, an object with watch, reset and act, named "
+    "module:object or by an entry point imop.methods"
 )
 
 
@@ -76,13 +77,17 @@ def find_method(name: str) -> Callable[[], object]:
     """What makes the policy of a method of one's own.
 
     Raises:
-        InvalidInput: if there is none, or it cannot be called.
+        InvalidInput: if there is none, or it is no class or function that can be called without arguments.
     """
     factory = plugins.find("method", name, "imop.methods")
     if factory is None:
-        raise InvalidInput("method", name, f"{', '.join(METHODS)} (some only in simulation), or {_OWN}")
-    if not callable(factory):
+        raise InvalidInput(
+            "method", name, f"{', '.join(METHODS)} (oracle in simulation, expert in eval), or {_OWN}"
+        )
+    if not (inspect.isclass(factory) or inspect.isfunction(factory)):
         raise InvalidInput("method", f"{name} is a {type(factory).__name__}", _OWN)
+    if not plugins.takes_nothing(factory):
+        raise InvalidInput("method", f"{name} needs arguments", _OWN)
     made: Callable[[], object] = factory
     return made
 

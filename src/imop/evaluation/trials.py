@@ -75,10 +75,13 @@ def suite_trials(
     """`episodes` scenes for each task, by its name within the suite, with the task's variations in turn.
 
     Raises:
-        InvalidInput: for an unknown suite, split or task, or no episodes.
+        InvalidInput: for an unknown suite, split or task, no episodes, or seeds of demonstrations.
     """
     if episodes < 1:
         raise InvalidInput("episodes", f"{episodes}", "at least 1")
+    if seed + episodes > DEMONSTRATION_SEED:
+        problem = f"{episodes} scenes from {seed} on"
+        raise InvalidInput("seed", problem, f"scenes below {DEMONSTRATION_SEED}, where demonstrations begin")
     return {
         name.removeprefix(f"{suite}/"): [
             Trial(name, seed + i, i % find_task(name).variations, instance) for i in range(episodes)

@@ -43,6 +43,9 @@ def _suite(name: str, found: Any) -> Suite:
     splits = found.items() if isinstance(found, Mapping) else ()
     if not splits or not all(isinstance(tasks, Mapping) and tasks for _, tasks in splits):
         raise InvalidInput("suite", f"{name} is a {type(found).__name__}", _SUITE)
+    names = [task for tasks in found.values() for task in tasks]
+    if unfit := [task for task in names if not isinstance(task, str) or "/" in task]:
+        raise InvalidInput("suite", f"{name} has a task {unfit[0]!r}", "names of tasks without a slash")
     suite = {
         split: {f"{name}/{task}": _task(f"{name}/{task}", kind) for task, kind in tasks.items()}
         for split, tasks in splits
@@ -60,7 +63,7 @@ def find_task(name: str) -> type[Task]:
     tasks = _tasks_of(name.rpartition("/")[0])
     if name in tasks:
         return tasks[name]
-    found = None if tasks else plugins.find("task", name, "imop.tasks")
+    found = None if tasks and ":" in name else plugins.find("task", name, "imop.tasks")
     if found is None:
         raise InvalidInput("task", name, f"{_nearest(name, tasks)}, or {_TASK}")
     return _task(name, found)
@@ -83,4 +86,6 @@ def _task(name: str, found: Any) -> type[Task]:
     if inspect.isabstract(found):
         missing = ", ".join(sorted(found.__abstractmethods__))
         raise InvalidInput("task", f"{name} does not define {missing}", _TASK)
+    if not plugins.takes_nothing(found):
+        raise InvalidInput("task", f"{name} needs arguments", f"{_TASK}, made without any")
     return found
