@@ -33,17 +33,17 @@ wheel: install
 
 # The wheel in fresh environments and an empty folder.
 test-wheel: wheel
-	.ci/test_wheel $(PYTHON)
+	.ci/test_wheel $(abspath $(BIN))/python
 
 # The lowest versions that pyproject.toml allows, with the tests of what uses them.
 test-lowest: install
 	mkdir -p build
 	$(BIN)/python .ci/lowest.py > build/lowest.txt
-	$(PYTHON) -m venv --clear build/lowest
+	$(BIN)/python -m venv --clear build/lowest
 	build/lowest/bin/pip install --quiet --disable-pip-version-check -c build/lowest.txt -e '.[sim,viz,train]' \
 		hypothesis pytest pytest-xdist
 	build/lowest/bin/python -m pytest -n 2 --dist loadfile tests/demos tests/geometry tests/networks tests/policy \
-		tests/robots tests/sim tests/training tests/evaluation
+		tests/robots tests/sim tests/training tests/evaluation tests/test_cli.py
 
 # Rewrites constraints.txt from what is installed now.
 lock: install

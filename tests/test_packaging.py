@@ -19,6 +19,7 @@ MODULES = {
     "baselines": ("open3d",),
     "cluster": ("ray",),
 }
+EVERY = tuple(module for modules in MODULES.values() for module in modules)
 # Imports every module; prints which extra it lacks, or a dash.
 EVERY_MODULE = """
 import importlib, pkgutil, imop
@@ -53,8 +54,7 @@ def store(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def base_only() -> dict[str, str]:
     """Which extra each module lacks where no extra is installed."""
-    every = tuple(name for names in MODULES.values() for name in names)
-    done = python(EVERY_MODULE, without=every)
+    done = python(EVERY_MODULE, without=EVERY)
     assert done.returncode == 0, done.stderr
     return dict(line.split() for line in done.stdout.splitlines())
 
@@ -99,13 +99,12 @@ def test_extras_bring_the_modules_that_they_are_named_for():
 
 
 def test_a_policy_predicts_recorded_data_with_the_base_alone(store, tmp_path):
-    every = tuple(name for names in MODULES.values() for name in names)
     arguments = ("--demo", str(store), "--query", str(store), "--out", str(tmp_path))
-    done = imop("predict", *arguments, without=every)
+    done = imop("predict", *arguments, without=EVERY)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "result.json").exists()
     assert "imop[viz]" in done.stdout
-    assert imop("check", str(store), without=every).returncode == 0
+    assert imop("check", str(store), without=EVERY).returncode == 0
 
 
 @pytest.mark.parametrize("verb", [("run", "--task", "tabletop/lid_off_pot"), ("eval",), ("tasks",)])

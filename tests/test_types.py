@@ -32,6 +32,15 @@ MIRROR = np.diag([1.0, 1.0, -1.0, 1.0])
         (lambda: view(intrinsics=np.diag([-40.0, 40.0, 1.0])), "intrinsics"),
         (lambda: view(depth=np.ones((16, 32))), "depth"),
         (lambda: view(rgb=np.zeros((32, 32))), "rgb"),
+        (lambda: view(rgb=np.full((32, 32, 3), 0.5)), "rgb: an array of float64.*0 to 255"),
+        (lambda: view(rgb=np.full((32, 32, 3), 200.0)), "rgb: an array of float64"),
+        (lambda: view(rgb=np.full((32, 32, 3), 256)), "rgb: integers from 256 to 256.*0 to 255"),
+        (lambda: view(rgb=np.full((32, 32, 3), -1)), "rgb: integers from -1"),
+        (lambda: view(rgb=[[[300, 0, 0]]], depth=[[1.0]]), "rgb"),
+        (lambda: view(rgb=np.zeros((0, 0, 3), np.uint8), depth=np.zeros((0, 0))), "rgb.*at least one pixel"),
+        (lambda: view(instance_ids=np.full((32, 32), 2**40)), "instance_ids"),
+        (lambda: view(intrinsics=[[1, 1, 0], [1, 1, 0], [0, 0, 1]]), "intrinsics"),
+        (lambda: view(intrinsics=[[1, np.inf, 0], [0, 1, 0], [0, 0, 1]]), "intrinsics"),
         (lambda: view(T_world_camera=2 * np.eye(4)), "T_world_camera"),
         (lambda: view(T_world_camera=MIRROR), "T_world_camera"),
         (lambda: view(instance_ids=np.zeros(3)), "instance_ids"),
@@ -40,6 +49,9 @@ MIRROR = np.diag([1.0, 1.0, -1.0, 1.0])
         (lambda: observation(T_world_gripper=np.full((4, 4), np.nan)), "T_world_gripper"),
         (lambda: observation(T_world_gripper="here"), "T_world_gripper"),
         (lambda: observation(joint_positions=np.eye(7)), "joint_positions"),
+        (lambda: observation(joint_positions=[0, np.nan]), "joint_positions"),
+        (lambda: observation(joint_velocities=[np.inf]), "joint_velocities"),
+        (lambda: observation(gripper_opening=np.nan), "gripper_opening"),
         (lambda: Action(np.eye(4), True, confidence=1.5), "confidence"),
         (lambda: Action(np.eye(3), True), "T_world_gripper"),
         (lambda: Match(0, np.zeros((4, 3)), np.zeros((5, 3)), np.zeros((0, 3))), "p_query"),
@@ -62,6 +74,11 @@ def test_values_cannot_be_changed_from_outside():
         frozen.depth[0, 0] = 2
 
 
+def test_colours_may_be_any_integers_that_fit():
+    assert view(rgb=np.full((32, 32, 3), 255)).rgb.dtype == np.uint8
+    assert view(rgb=[[[0, 128, 255]]], depth=[[1.0]]).rgb.tolist() == [[[0, 128, 255]]]
+
+
 def test_unmeasured_depth_is_allowed_and_known():
     depth = np.ones((32, 32))
     depth[0, :3] = 0, np.nan, np.inf
@@ -76,7 +93,7 @@ def test_steps_end_in_the_next_observation():
 
 
 def test_stripping_leaves_only_what_a_robot_knows():
-    ids = replace(view(), instance_ids=np.ones((32, 32)))
+    ids = replace(view(), instance_ids=np.ones((32, 32), int))
     told = observation(views={"front": ids}, joint_velocities=np.ones(7), instance_names={1: "lid"})
     demo = Demonstration(
         (Keyframe(told, Action(np.eye(4), True), "lid", np.eye(4)),), told, "tabletop/x", 2, ("do",)

@@ -189,19 +189,35 @@ def evaluate(
 
 
 @app.command(name="import")
-def import_(layout: Positional[Literal["rlbench"]], source: Positional[Path], out: Positional[Path]) -> int:
+def import_(
+    layout: Positional[Literal["rlbench"]],
+    source: Positional[Path],
+    out: Positional[Path],
+    cameras: Annotated[str | None, tyro.conf.arg(metavar="NAME,NAME")] = None,
+) -> int:
     """Convert recorded demonstrations into a store.
+
+    Nothing that can be read is left out; what `imop check` would say about it is said. Episodes that are in
+    the store already are not stored again, so an import that was stopped is continued by starting it again.
 
     Args:
         layout: how the recordings are laid out: rlbench as PerAct, RVT and Act3D use it.
         source: an episode, a task folder, or a folder of task folders.
         out: folder of the store; an existing one is appended to.
+        cameras: which cameras, joined by commas; by default front, left_shoulder, right_shoulder and wrist,
+            as far as they were recorded.
     """
-    from imop.demos.rlbench import import_rlbench
+    from imop.demos.rlbench_import import import_rlbench
+    from imop.robots.panda import tip_pose
 
-    count = import_rlbench(source, out, track=lambda these: _track(these, f"importing {source}"))
-    console.print(f"{count} demonstrations imported into {out}")
-    return 0
+    names = None if cameras is None else cameras.split(",")
+    done = import_rlbench(source, out, names, tip_pose, lambda these: _track(these, f"importing {source}"))
+    for finding in done.findings:
+        console.print(str(finding))
+    console.print(
+        f"{done.stored} demonstrations imported into {out}, {done.there_already} were there already"
+    )
+    return 1 if any(finding.severity == "error" for finding in done.findings) else 0
 
 
 @app.command
@@ -223,16 +239,21 @@ def export(layout: Positional[Literal["rlbench"]], store: Positional[Path], out:
 
 
 @app.command
-def check(path: Positional[Path]) -> int:
+def check(
+    path: Positional[Path], cameras: Annotated[str | None, tyro.conf.arg(metavar="NAME,NAME")] = None
+) -> int:
     """Say what is wrong with recorded demonstrations, where, and how to mend it.
 
     Args:
         path: a store, or a folder in RLBench's layout.
+        cameras: which cameras every episode of the folder should have, joined by commas; by default front,
+            left_shoulder, right_shoulder and wrist, as far as any episode has them.
     """
     from imop.demos.check import check as find
     from imop.robots.panda import tip_pose
 
-    findings = find(path, tip_pose=tip_pose, track=lambda these: _track(these, f"checking {path}"))
+    names = None if cameras is None else cameras.split(",")
+    findings = find(path, names, tip_pose, lambda these: _track(these, f"checking {path}"))
     for finding in findings:
         console.print(str(finding))
     errors = sum(finding.severity == "error" for finding in findings)
@@ -342,16 +363,20 @@ def assets(suite: Positional[Literal["rlbench"]], source: Annotated[Path, tyro.c
 
     files = [name.removeprefix(f"{suite}/") for name in RLBENCH]
     with _status(f"reading {source}"):
-        problems = install(source, files)
-    for file, problem in problems.items():
-        if problem:
-            console.print(f"{file}.ttm: {problem}", style="red")
-    missing = [file for file in files if file not in problems]
+        done = install(source, files)
+    unreadable = {file: found.error for file, found in done.items() if found.error}
+    for file, problem in unreadable.items():
+        console.print(f"{file}.ttm: {problem}", style="red")
+    missing = [file for file in files if file not in done]
     if missing:
         console.print(f"not found: {', '.join(missing)}")
+    for file, found in done.items():
+        if file not in files and not found.error:
+            remarks = "; ".join(found.lacks) or "nothing is lacking"
+            console.print(f"{file}.ttm, for a task of your own: {remarks}")
     ready = sum(task.available() for task in RLBENCH.values())
     console.print(f"{ready} of {len(files)} tasks of {suite} are available, from {folder()}")
-    return 1 if any(problems.values()) else 0
+    return 1 if unreadable else 0
 
 
 @app.command

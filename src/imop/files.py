@@ -1,4 +1,4 @@
-"""Files appear whole or not at all."""
+"""Files appear whole or not at all, and what cannot be read is said in one way."""
 
 import os
 import tempfile
@@ -6,7 +6,30 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from imop.errors import InvalidInput
+from imop.errors import CorruptData, InvalidInput
+
+_LFS_POINTER = b"version https://git-lfs.github.com/spec/v1"
+
+
+def read(path: Path, remedy: str = "restore it or record it again") -> bytes:
+    """The content of a file.
+
+    Args:
+        path: the file.
+        remedy: what to do if it is missing.
+
+    Raises:
+        CorruptData: if it is missing or cannot be read, or git LFS left a pointer in its place.
+    """
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise CorruptData(path, "the file is missing", remedy) from None
+    except OSError as error:
+        raise CorruptData(path, f"the file cannot be read ({error.strerror})", remedy) from error
+    if content.startswith(_LFS_POINTER):
+        raise CorruptData(path, "is a pointer of git LFS, not the file itself", "run `git lfs pull`")
+    return content
 
 
 @contextmanager

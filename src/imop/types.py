@@ -25,12 +25,18 @@ def as_array(name: str, value: Any, shape: tuple[int | None, ...], dtype: Any = 
     """Convert `value` to a read-only array of `dtype`; None in `shape` accepts any length.
 
     Raises:
-        InvalidInput: if it is not numeric or has another shape.
+        InvalidInput: if it is not numeric, has another shape, or holds anything but fitting integers where
+            `dtype` is one of integers.
     """
     wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + f") {np.dtype(dtype).name}"
     try:
-        array = np.array(value, dtype=dtype)
-    except (TypeError, ValueError) as error:
+        given = np.asarray(value)
+        if np.dtype(dtype).kind in "iu":
+            _check_integers(name, given, np.iinfo(dtype))
+        array = np.array(given, dtype=dtype)
+    except InvalidInput:
+        raise
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidInput(name, f"not an array ({error})", wanted) from error
     if array.ndim != len(shape) or any(
         n is not None and n != m for n, m in zip(shape, array.shape, strict=True)
@@ -38,6 +44,29 @@ def as_array(name: str, value: Any, shape: tuple[int | None, ...], dtype: Any = 
         raise InvalidInput(name, f"shape {array.shape}", wanted)
     array.setflags(write=False)
     return array
+
+
+def as_finite(name: str, value: Any, shape: tuple[int | None, ...]) -> FloatArray:
+    """As `as_array`, of float64.
+
+    Raises:
+        InvalidInput: as `as_array`, and if a number is NaN or infinite.
+    """
+    array = as_array(name, value, shape)
+    if not np.all(np.isfinite(array)):
+        raise InvalidInput(name, "not finite", "finite numbers")
+    return array
+
+
+def _check_integers(name: str, given: NDArray[Any], limits: np.iinfo[Any]) -> None:
+    """A conversion would turn colours from 0 to 1 into black, and 256 into 0, without a word."""
+    if not given.size or given.dtype == limits.dtype:
+        return
+    accepted = f"integers from {limits.min} to {limits.max}"
+    if given.dtype.kind not in "iu":
+        raise InvalidInput(name, f"an array of {given.dtype.name}", accepted)
+    if given.min() < limits.min or given.max() > limits.max:
+        raise InvalidInput(name, f"integers from {given.min()} to {given.max()}", accepted)
 
 
 def as_pose(name: str, value: Any) -> FloatArray:
@@ -71,7 +100,7 @@ class CameraView:
     forward, integer pixel coordinates from the top left corner.
 
     Attributes:
-        rgb: (H, W, 3) uint8.
+        rgb: (H, W, 3) uint8, at least one pixel; integers from 0 to 255 are accepted, fractions are not.
         depth: (H, W) float32, metres along the optical axis; 0, NaN and inf mean no measurement.
         intrinsics: (3, 3) float64, pixels, positive focal lengths.
         T_world_camera: (4, 4) float64.
@@ -87,8 +116,10 @@ class CameraView:
     def __post_init__(self) -> None:
         rgb = as_array("rgb", self.rgb, (None, None, 3), np.uint8)
         image = rgb.shape[:2]
-        K = as_array("intrinsics", self.intrinsics, (3, 3))
-        if not (np.all(np.isfinite(K)) and K[0, 0] > 0 and K[1, 1] > 0 and np.allclose(K[2], (0, 0, 1))):
+        if not rgb.size:
+            raise InvalidInput("rgb", f"shape {rgb.shape}", "an image with at least one pixel")
+        K = as_finite("intrinsics", self.intrinsics, (3, 3))
+        if not (K[0, 0] > 0 and K[1, 1] > 0 and np.allclose(K[[1, 2, 2, 2], [0, 0, 1, 2]], (0, 0, 0, 1))):
             raise InvalidInput(
                 "intrinsics", f"{K.tolist()}", "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]], fx, fy > 0"
             )
@@ -117,7 +148,7 @@ class Observation:
         T_world_gripper: (4, 4).
         gripper_opening: 0 closed .. 1 fully open (fraction of the stroke).
         time_step: number of keyframes reached so far in this episode.
-        joint_positions: (n,) radians or None. The Panda's follow Franka's convention.
+        joint_positions: (n,) radians, finite, or None. The Panda's follow Franka's convention.
         joint_velocities: (n,) radians per second or None; no policy reads them.
         instance_names: what the instance ids of the views are called; only training may read it.
     """
@@ -145,8 +176,8 @@ class Observation:
             T_world_gripper=as_pose("T_world_gripper", self.T_world_gripper),
             gripper_opening=min(max(opening, 0.0), 1.0),
             time_step=int(self.time_step),
-            joint_positions=None if q is None else as_array("joint_positions", q, (None,)),
-            joint_velocities=None if dq is None else as_array("joint_velocities", dq, (None,)),
+            joint_positions=None if q is None else as_finite("joint_positions", q, (None,)),
+            joint_velocities=None if dq is None else as_finite("joint_velocities", dq, (None,)),
         )
 
     def stripped(self) -> "Observation":

@@ -304,6 +304,102 @@ def test_folder_without_cameras(folder):
     for name in CAMERAS:
         shutil.rmtree(folder / f"{name}_rgb")
     assert len(check(folder, CAMERAS)) == 3
+    assert len(check(folder)) == 3
+    for name in CAMERAS:
+        shutil.rmtree(folder / f"{name}_depth")
+    assert len(check(folder)) == 4
+
+
+def remove(folder, camera):
+    for kind in ("rgb", "depth", "mask"):
+        shutil.rmtree(folder / f"{camera}_{kind}")
+
+
+def test_cameras_need_not_be_there_but_must_be_in_all_episodes(folder):
+    assert check(folder) == []
+    for camera in CAMERAS[1:]:
+        remove(folder, camera)
+    assert check(folder) == []
+    assert "camera wrist" in only(check(folder, ["front", "wrist"])).where
+    write_episode(folder.with_name("episode1"), lift_a_cube())
+    found = check(folder.parent)
+    assert [f.where for f in found] == [f"{folder}, camera {c}" for c in CAMERAS[1:]]
+    with pytest.raises(InvalidInput, match="cameras"):
+        check(folder, ["back"])
+
+
+BAD_NUMBERS = [
+    {"gripper_matrix": np.full((4, 4), np.nan)},
+    {"gripper_matrix": np.diag([1.0, 1, -1, 1])},
+    {"gripper_pose": np.full(7, np.inf)},
+    {"gripper_pose": np.zeros(7), "gripper_matrix": None},
+    {"joint_positions": np.full(7, np.nan)},
+    {"joint_velocities": np.full(7, np.inf)},
+    {"joint_velocities": np.zeros(0)},
+    {"gripper_open": np.nan},
+    {"gripper_joint_positions": np.zeros(0)},
+    {"gripper_joint_positions": np.array([0.04])},
+    {"ignore_collisions": np.nan},
+    {"misc": None},
+]
+
+
+@pytest.mark.parametrize("bad", BAD_NUMBERS, ids=str)
+def test_one_bad_number_is_a_finding_and_the_others_are_checked(folder, bad):
+    good = folder.with_name("episode1")
+    write_episode(good, lift_a_cube())
+    (good / "front_rgb" / f"{KEYFRAMES[1]}.png").unlink()
+    frames = frames_of(lift_a_cube())
+    frames[KEYFRAMES[0]] |= bad
+    dump_demo(folder / "low_dim_obs.pkl", frames)
+    first, second = check(folder.parent)
+    assert (
+        first.severity == "error" and "episode0" in first.where and f"frame {KEYFRAMES[0]}" in first.problem
+    )
+    assert second.where.endswith(f"episode1/front_rgb/{KEYFRAMES[1]}.png")
+
+
+def test_no_frame_at_all(folder):
+    dump_demo(folder / "low_dim_obs.pkl", [])
+    assert "no frame" in only(check(folder)).problem
+
+
+@pytest.mark.parametrize("nothing", [np.zeros(7), None])
+def test_joint_velocities_that_nobody_measured(folder, nothing):
+    dump_demo(
+        folder / "low_dim_obs.pkl", [f | {"joint_velocities": nothing} for f in frames_of(lift_a_cube())]
+    )
+    found = check(folder)
+    assert found[0].where.endswith("joint_velocities") and "missing or 0" in found[0].problem
+    assert found[0].severity == "warning"
+
+
+def test_a_damaged_episode_of_a_store_is_a_finding_and_the_others_are_checked(tmp_path):
+    store = DemonstrationStore.create(tmp_path / "store")
+    for factor in (1, 1, 1000):
+        store.append(scaled(["front"], factor))
+    (store.path / "episode_000000" / "zarr.json").write_text("{")
+    (store.path / "episode_000001" / "depth_128x128" / "zarr.json").unlink()
+    found = check(store.path)
+    assert {f.where.split("/episode_")[1][:6] for f in found} == {"000000", "000001", "000002"}
+
+
+@pytest.mark.parametrize("scale", [0.08, 0.04])
+def test_gripper_opening_as_a_width_in_metres(scale):
+    wrong = with_observations(
+        lift_a_cube(), lambda k, o: replace(o, gripper_opening=scale * o.gripper_opening)
+    )
+    found = only([f for f in findings(wrong) if f.severity == "error"])
+    assert found.where == "demo, gripper_opening"
+    assert "width" in found.problem and "0.08" in found.remedy
+
+
+def test_depth_that_is_too_near_to_be_one():
+    coded = with_views(
+        lift_a_cube(), lambda k, n, v: replace(v, depth=np.where(v.measured, 0.01 + v.depth / 4000, 0))
+    )
+    found = findings(coded)
+    assert len(found) == 12 and all("depth" in f.where and f.severity == "error" for f in found)
 
 
 def test_missing_image(folder):

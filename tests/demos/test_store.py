@@ -93,7 +93,7 @@ def views(draw):
 @st.composite
 def some_observations(draw):
     cameras = draw(st.lists(st.sampled_from("abcd"), min_size=1, max_size=3, unique=True))
-    joints = st.none() | st.lists(st.floats(allow_nan=True), max_size=8)
+    joints = st.none() | st.lists(st.floats(allow_nan=False, allow_infinity=False), max_size=8)
     return Observation(
         {name: draw(views()) for name in cameras},
         draw(poses),
@@ -171,6 +171,78 @@ def test_version_is_checked(copy):
         DemonstrationStore.open(copy)
 
 
+def as_version_1(store):
+    """The store as imop wrote it before episodes had a digest."""
+    for file in (store / "zarr.json", *store.glob("episode_*/zarr.json")):
+        description = json.loads(file.read_text())
+        description["attributes"].pop("digest", None)
+        if "version" in description["attributes"]:
+            description["attributes"]["version"] = 1
+        file.write_text(json.dumps(description))
+
+
+def test_stores_of_version_1_can_be_read_and_continued(copy):
+    as_version_1(copy)
+    store = DemonstrationStore.open(copy)
+    assert_same(store[0], lift_a_cube())
+    store.append(lift_a_cube())
+    assert_same(DemonstrationStore.open(copy)[2], lift_a_cube())
+    assert len(store.digests()) == 2
+
+
+def changed(copy, change):
+    """The first episode's attributes, changed on disk."""
+    file = copy / "episode_000000" / "zarr.json"
+    description = json.loads(file.read_text())
+    change(description["attributes"])
+    file.write_text(json.dumps(description))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda a: a["observations"][1].update(gripper_opening=0.99),
+        lambda a: a["observations"][0]["views"][0].update(camera="frond"),
+        lambda a: a["observations"][0]["joint_positions"].__setitem__(1, 2),
+        lambda a: a["keyframes"][0].update(gripper_open=False),
+        lambda a: a.update(variation=3),
+        lambda a: a.pop("digest"),
+        lambda a: a.update(digest=a["digest"].replace("0", "1")),
+        lambda a: a["arrays"]["depth_128x128"].update(crc32=1),
+    ],
+)
+def test_changed_attributes_are_noticed_on_opening(copy, change):
+    changed(copy, change)
+    with pytest.raises(CorruptData, match=r"episode_000000.*digest"):
+        DemonstrationStore.open(copy)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda a: a["arrays"]["depth_128x128"].pop("crc32"),
+        lambda a: a.update(seeds=[1]),
+        lambda a: a["observations"].clear(),
+    ],
+)
+def test_changed_attributes_of_version_1_are_corrupt_data(copy, change):
+    as_version_1(copy)
+    changed(copy, change)
+    with pytest.raises(CorruptData, match="episode_000000"):
+        DemonstrationStore.open(copy)[0]
+
+
+@pytest.mark.parametrize("key", ["chunk_grid", "codecs"])
+def test_absurd_blocks_are_refused(copy, key):
+    file = copy / "episode_000000" / "depth_128x128" / "zarr.json"
+    description = json.loads(file.read_text())
+    part = description[key] if key == "chunk_grid" else description[key][0]
+    part["configuration"]["chunk_shape"][1] *= 10**6
+    file.write_text(json.dumps(description))
+    with pytest.raises(CorruptData, match="episode_000000/depth_128x128"):
+        DemonstrationStore.open(copy)
+
+
 def test_shapes_are_checked_on_opening(copy):
     file = next(copy.glob("episode_000001/depth_*/zarr.json"))
     description = json.loads(file.read_text())
@@ -230,7 +302,8 @@ def test_attributes_that_do_not_fit(copy):
     description = json.loads(file.read_text())
     description["attributes"]["keyframes"].pop()
     file.write_text(json.dumps(description))
-    with pytest.raises(CorruptData, match="episode_000001"):
+    as_version_1(copy)
+    with pytest.raises(CorruptData, match=r"episode_000001.*fit together"):
         DemonstrationStore.open(copy)[1]
 
 
@@ -264,7 +337,7 @@ store.append(lift_a_cube())
 @pytest.mark.parametrize("moment", ["0", "3", "before renaming"])
 def test_killed_writer(tmp_path, moment):
     path = tmp_path / "store"
-    env = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
+    env = {**os.environ, "PYTHONPATH": f"{REPOSITORY / 'src'}{os.pathsep}{REPOSITORY}"}
     writer = subprocess.run([sys.executable, "-c", WRITER, str(path), moment], env=env)
     assert writer.returncode == -signal.SIGKILL
     leftovers = list(path.glob(".writing-*"))
@@ -313,7 +386,7 @@ for _ in range(3):
 
 
 def test_two_writers(store):
-    env = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
+    env = {**os.environ, "PYTHONPATH": f"{REPOSITORY / 'src'}{os.pathsep}{REPOSITORY}"}
     command = [sys.executable, "-c", APPENDER, str(store.path)]
     writers = [subprocess.Popen([*command, str(i)], env=env) for i in range(2)]
     assert [w.wait() for w in writers] == [0, 0]

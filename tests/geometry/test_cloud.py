@@ -120,6 +120,11 @@ def test_farthest_points_begin_with_the_first_and_are_each_the_farthest_from_tho
     np.testing.assert_array_equal(chosen, expected)
 
 
+def test_farthest_points_are_different_ones_even_where_points_coincide():
+    points = np.repeat([[0.3, 0.1, 0.8], [0.4, 0.2, 0.9]], 5, axis=0)
+    assert len(set(clouds.farthest_points(points, 9).tolist())) == 9
+
+
 def test_farthest_points_spread_better_than_chance(rng):
     points = rng.normal(size=(2000, 3))
     chosen = clouds.farthest_points(points, 50)

@@ -6,7 +6,7 @@ import pytest
 
 from imop.geometry import se3
 from imop.robots.panda import PANDA_HOME_Q
-from imop.sim.gripper import attach, between_fingers, is_commanded_open, release, set_gripper
+from imop.sim.gripper import attach, between_fingers, release, set_gripper
 from imop.sim.kinematics import inverse_kinematics
 from imop.sim.world import TABLE_HEIGHT, World, allow_grasp, scene_spec
 
@@ -35,7 +35,7 @@ def T_gripper_cube(world: World) -> np.ndarray:
 def test_closing_attaches_and_opening_releases() -> None:
     world = world_with_cube()
     set_gripper(world, False)
-    assert world.held == ("cube",) and not is_commanded_open(world)
+    assert world.held == ("cube",)
     assert 0.3 < world.gripper_opening < 0.6, "blocked by a 4 cm cube"
     set_gripper(world, True)
     assert world.held == () and world.gripper_opening > 0.98
@@ -98,6 +98,27 @@ def test_same_request_twice_changes_nothing() -> None:
     clock = world.time
     set_gripper(world, False)
     assert world.time == clock and world.held == ("cube",)
+
+
+def test_fingers_stop_where_they_are_told() -> None:
+    world = world_with_cube()
+    world.set_free_pose("cube", TIP @ se3.make(p=(0, 0, 0.3)))
+    for opening in (0.6, 0.3, 0.7):
+        set_gripper(world, False, opening=opening)
+        assert world.gripper_opening == pytest.approx(opening, abs=0.02)
+    clock = world.time
+    set_gripper(world, False, opening=0.7)
+    assert world.time == clock
+    set_gripper(world, False)
+    assert world.gripper_opening < 0.02, "half closed is not closed"
+
+
+def test_closing_by_a_part_attaches_and_opening_by_a_part_releases() -> None:
+    world = world_with_cube()
+    set_gripper(world, False, opening=0.6)
+    assert world.held == ("cube",) and world.gripper_opening > 0.57, "4 cm are not touched at 4.8 cm"
+    set_gripper(world, False, opening=0.8)
+    assert world.held == ()
 
 
 def test_release_lets_go_without_moving_time() -> None:

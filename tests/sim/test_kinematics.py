@@ -40,6 +40,30 @@ def test_the_home_pose_finds_the_home_configuration() -> None:
     assert np.abs(nearest - PANDA_HOME_Q).max() < 0.06, "within the sampling of joint 7"
 
 
+def farthest(T: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """The pose where the arm stops when it moves away from `T`, to a micrometre."""
+    near, far = 0.0, 2.0
+    while far - near > 1e-6:
+        middle = (near + far) / 2
+        near, far = (middle, far) if reachable(se3.make(p=middle * direction) @ T) else (near, middle)
+    return se3.make(p=near * direction) @ T
+
+
+@given(CONFIGURATIONS, st.integers(0, 10_000))
+def test_a_tenth_of_a_millimetre_inside_the_workspace_is_reached(q: np.ndarray, seed: int) -> None:
+    direction = np.random.default_rng(seed).normal(size=3)
+    direction /= np.linalg.norm(direction)
+    edge = farthest(tip_pose(q), direction)
+    for back in (5e-5, 1e-4, 2e-4):
+        assert reachable(se3.make(p=-back * direction) @ edge)
+
+
+@given(CONFIGURATIONS, st.integers(0, 6), st.booleans())
+def test_poses_with_a_joint_near_its_limit_are_reached(q: np.ndarray, joint: int, upper: bool) -> None:
+    q[joint] = JOINT_UPPER[joint] - 1e-4 if upper else JOINT_LOWER[joint] + 1e-4
+    assert reachable(tip_pose(q))
+
+
 def test_beyond_reach_there_is_no_solution() -> None:
     assert inverse_kinematics(se3.make(p=(2.0, 0, 1.0)), PANDA_HOME_Q).shape == (0, 7)
 

@@ -64,7 +64,7 @@ def test_every_row_of_the_table_trains(row, shards, tmp_path):
         {name: np.mean([h[name] for h in part]) for name in history[0]}
         for part in (history[:15], history[-15:])
     )
-    assert all(last[name] < 0.75 * first[name] for name in first), (first, last)
+    assert all(last[name] < 0.8 * first[name] for name in first), (first, last)
     model = load_model(tmp_path)
     assert model.config == shape
     assert all(0 <= value <= 1 for value in validate(model, shards, 2).values())

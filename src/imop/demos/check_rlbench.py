@@ -7,13 +7,17 @@ import numpy as np
 
 from imop.demos.check_steps import TipPose, check_demonstration
 from imop.demos.findings import Finding
-from imop.demos.keyframes import pose_keyframes, published_keyframes
 from imop.demos.low_dim import LOW_DIM, Frame, read_frames
-from imop.demos.rlbench import read_episode
-from imop.errors import CorruptData
+from imop.demos.rlbench import (
+    find_keyframes,
+    joint_velocities,
+    path_keyframes,
+    read_episode,
+    recorded_cameras,
+)
+from imop.errors import ImopError
 from imop.geometry import se3
 
-RLBENCH_TIME_STEP = 0.05
 NEAR_FRAMES = 5
 
 
@@ -23,7 +27,8 @@ def check_episode(folder: Path, cameras: Sequence[str], tip_pose: TipPose | None
     for camera in cameras:
         if camera not in present:
             problem = f"the rgb or the depth images of camera {camera} are missing"
-            remedy = "restore them, or leave this camera out everywhere"
+            recorded = ", ".join(recorded_cameras(folder)) or "there is none"
+            remedy = f"restore them, or ask for cameras that were recorded: {recorded}"
             yield Finding("error", f"{folder}, camera {camera}", problem, remedy)
     try:
         frames = read_frames(folder / LOW_DIM)
@@ -31,8 +36,8 @@ def check_episode(folder: Path, cameras: Sequence[str], tip_pose: TipPose | None
         yield from _rests(frames, str(folder / LOW_DIM))
         if present:
             yield from check_demonstration(read_episode(folder, present), str(folder), tip_pose)
-    except CorruptData as error:
-        yield Finding("error", str(error.path), error.problem, error.remedy)
+    except ImopError as error:
+        yield Finding.of(error, str(folder))
 
 
 def _poses(frames: list[Frame], where: str) -> Iterator[Finding]:
@@ -61,15 +66,15 @@ def _poses(frames: list[Frame], where: str) -> Iterator[Finding]:
 
 def _rests(frames: list[Frame], where: str) -> Iterator[Finding]:
     """Keyframes by the gripper's path that joint velocities do not show."""
-    T = np.array([frame.T_world_gripper for frame in frames])
-    is_open = np.array([frame.gripper_open for frame in frames])
-    velocities = np.array([frame.numbers("joint_velocities", (7,)) for frame in frames])
-    opening = np.array([frame.gripper_opening for frame in frames])
-    times = np.arange(len(frames), dtype=np.float64) * RLBENCH_TIME_STEP
-    found = published_keyframes(is_open, velocities)
-    for i in pose_keyframes(T, opening, times):
+    here = f"{where}, joint_velocities"
+    if joint_velocities(frames) is None:
+        problem = "they are missing or 0 in all frames; keyframes are taken where the gripper rests or opens"
+        yield Finding("warning", here, problem, "record them, in rad/s")
+        return
+    found = find_keyframes(frames)
+    for i in path_keyframes(frames):
         near = [j for j in found if abs(i - j) <= NEAR_FRAMES]
         if not near:
             problem = f"the gripper rests at frame {i}, but no keyframe is near: they are {found}"
             remedy = "check that joint_velocities are in rad/s; else a keyframe is missing"
-            yield Finding("warning", f"{where}, joint_velocities", problem, remedy)
+            yield Finding("warning", here, problem, remedy)

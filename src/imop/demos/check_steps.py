@@ -14,6 +14,9 @@ from imop.types import Demonstration, FloatArray, Observation
 # A table-top cell is a few metres; numbers beyond these are millimetres or degrees.
 LARGEST_METRES = 20.0
 LARGEST_RADIANS = 4 * np.pi
+# Nothing is seen that near; a fraction of the stroke is far larger once the gripper has opened.
+SMALLEST_DEPTH = 0.03
+LARGEST_WIDTH = 0.1
 
 REACHED = (0.02, np.deg2rad(10))
 KINEMATIC = (0.02, np.deg2rad(5))
@@ -37,6 +40,7 @@ def check_demonstration(
     observations = [*(k.observation for k in demonstration.keyframes), demonstration.final]
     wrong_units = list(_units(observations, where))
     yield from wrong_units
+    yield from _opening(demonstration, observations, where)
     yield from _measurements(observations, where)
     yield from _cameras(observations, where)
     yield from _order(demonstration, observations, where)
@@ -66,10 +70,25 @@ def _units(observations: list[Observation], where: str) -> Iterator[Finding]:
                 problem = f"the median depth is {depth:.4g} m"
                 remedy = "give metres; if these are millimetres, divide by 1000"
                 yield Finding("error", f"{here}, camera {name}, depth", problem, remedy)
+            elif 0 < depth < SMALLEST_DEPTH:
+                problem = f"the median depth is {depth:.4g} m, nearer than anything that a camera sees"
+                remedy = "give metres along the optical axis; check how the images code depth"
+                yield Finding("error", f"{here}, camera {name}, depth", problem, remedy)
         q = observation.joint_positions
         if q is not None and np.abs(q).max(initial=0.0) > LARGEST_RADIANS:
             problem = f"a joint is at {np.abs(q).max():.4g} rad"
             yield Finding("error", f"{here}, joint_positions", problem, "give radians, not degrees")
+
+
+def _opening(demonstration: Demonstration, observations: list[Observation], where: str) -> Iterator[Finding]:
+    """An open gripper must look open in some step, or the opening is not a fraction."""
+    largest = max(o.gripper_opening for o in observations)
+    if 0 < largest < LARGEST_WIDTH and any(k.action.gripper_open for k in demonstration.keyframes):
+        problem = f"it is at most {largest:.3g}, though the gripper opens, as a width in metres is"
+        remedy = (
+            "give the fraction of the stroke, 0 closed .. 1 open; divide by the stroke, 0.08 m for the Panda"
+        )
+        yield Finding("error", f"{where}, gripper_opening", problem, remedy)
 
 
 def _measurements(observations: list[Observation], where: str) -> Iterator[Finding]:

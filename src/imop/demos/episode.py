@@ -1,5 +1,7 @@
 """A demonstration as plain attributes and stacked arrays, and back: what one episode of a store contains."""
 
+import hashlib
+import json
 import zlib
 from collections.abc import Mapping
 from typing import Any
@@ -33,7 +35,7 @@ class _Columns:
 def pack(demonstration: Demonstration) -> tuple[Attributes, Arrays]:
     """Everything that `unpack` needs: attributes that JSON can hold, and arrays whose first axis counts rows.
 
-    The attribute "arrays" lists shape, type and checksum of every array.
+    The attribute "arrays" lists shape, type and checksum of every array; "digest" is that of all others.
 
     Raises:
         InvalidInput: if an action carries a match: predictions are not stored.
@@ -55,7 +57,27 @@ def pack(demonstration: Demonstration) -> tuple[Attributes, Arrays]:
         key: {"shape": list(a.shape), "dtype": a.dtype.name, "crc32": checksum(a)}
         for key, a in arrays.items()
     }
+    attributes["digest"] = digest(attributes)
     return attributes, arrays
+
+
+def digest(attributes: Mapping[str, Any]) -> str:
+    """SHA-256 of all attributes but "digest", as JSON with sorted keys and no spaces.
+
+    It says which episode it is: the attributes name the checksums of the arrays too.
+    """
+    others = {key: value for key, value in attributes.items() if key != "digest"}
+    text = json.dumps(others, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def digest_of(demonstration: Demonstration) -> str:
+    """The digest that `pack` gives it.
+
+    Raises:
+        InvalidInput: as `pack`.
+    """
+    return str(pack(demonstration)[0]["digest"])
 
 
 def checksum(array: NDArray[Any]) -> int:
@@ -107,7 +129,7 @@ def unpack(attributes: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) ->
     """The demonstration that was packed, equal in every field.
 
     Raises:
-        KeyError, IndexError, TypeError, ValueError, InvalidInput: if the parts do not fit together.
+        Exception: some kind of it, if the parts do not fit together.
     """
 
     def at(place: list[Any] | None) -> Any:
@@ -135,7 +157,7 @@ def unpack(attributes: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) ->
         attributes["task"],
         attributes["variation"],
         tuple(attributes["instructions"]),
-        attributes["seeds"],
+        dict(attributes["seeds"]),
     )
 
 

@@ -1,7 +1,9 @@
 """What a check found."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Self
+
+from imop.errors import CorruptData, ImopError, InvalidInput
 
 
 @dataclass(frozen=True)
@@ -19,6 +21,15 @@ class Finding:
     where: str
     problem: str
     remedy: str
+
+    @classmethod
+    def of(cls, error: ImopError, where: str) -> Self:
+        """The error that made `where` unreadable."""
+        if isinstance(error, CorruptData):
+            return cls("error", str(error.path), error.problem, error.remedy)
+        if isinstance(error, InvalidInput):
+            return cls("error", f"{where}, {error.field}", error.problem, f"give {error.accepted}")
+        return cls("error", where, str(error), "record it again")
 
     def __str__(self) -> str:
         return f"{self.severity}: {self.where}: {self.problem}; remedy: {self.remedy}"

@@ -4,7 +4,7 @@ import numpy as np
 
 from imop.errors import InvalidInput
 from imop.geometry.se3 import rotation_distance, translation_distance
-from imop.types import BoolArray, FloatArray, as_array
+from imop.types import BoolArray, FloatArray, as_finite
 
 STOP_BUFFER = 4
 
@@ -32,11 +32,11 @@ def published_keyframes(
         Increasing frame numbers, none of them 0; empty for fewer than two frames.
 
     Raises:
-        InvalidInput: if the lengths differ.
+        InvalidInput: if the lengths differ or a number is not finite.
     """
-    state = as_array("gripper_open", gripper_open, (None,))
+    state = as_finite("gripper_open", gripper_open, (None,))
     n = len(state)
-    resting = np.all(np.abs(as_array("joint_velocities", joint_velocities, (n, None))) <= at_rest, axis=1)
+    resting = np.all(np.abs(as_finite("joint_velocities", joint_velocities, (n, None))) <= at_rest, axis=1)
     keyframes: list[int] = []
     buffer = 0
     for i in range(n):
@@ -85,12 +85,12 @@ def pose_keyframes(
         Increasing frame numbers, none of them 0; empty for fewer than two frames.
 
     Raises:
-        InvalidInput: if the lengths differ or the times do not increase.
+        InvalidInput: if the lengths differ, a number is not finite, or the times do not increase.
     """
-    T = as_array("T_world_gripper", T_world_gripper, (None, 4, 4))
+    T = as_finite("T_world_gripper", T_world_gripper, (None, 4, 4))
     n = len(T)
-    opening = as_array("gripper_opening", gripper_opening, (n,))
-    t = as_array("times", times, (n,))
+    opening = as_finite("gripper_opening", gripper_opening, (n,))
+    t = as_finite("times", times, (n,))
     if not np.all(np.diff(t) > 0):
         raise InvalidInput(
             "times", "not strictly increasing", "seconds, every frame later than the one before"

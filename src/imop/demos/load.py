@@ -1,25 +1,36 @@
 """Demonstrations from whatever folder they lie in."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from imop.demos.rlbench import episodes, read_episode
 from imop.demos.store import DemonstrationStore
 from imop.errors import CorruptData, InvalidInput
-from imop.types import Demonstration
+from imop.types import Demonstration, Observation
 
 
-def load_demonstrations(path: Path, count: int | None = None) -> list[Demonstration]:
+def load_demonstrations(
+    path: Path, count: int | None = None, cameras: Sequence[str] | None = None
+) -> list[Demonstration]:
     """The first `count` (or all) demonstrations of a store, or of a folder in RLBench's layout.
 
+    Args:
+        path: the store or folder.
+        count: how many; all by default.
+        cameras: which views to keep; by default all of a store, and of a folder as in `read_episode`.
+
     Raises:
-        CorruptData: if there is none, or one cannot be read.
+        CorruptData: if there is none, one cannot be read or lacks one of `cameras`.
         InvalidInput: if `path` is neither.
     """
     if (path / "zarr.json").is_file():
         store = DemonstrationStore.open(path)
         found = [store[i] for i in range(len(store) if count is None else min(count, len(store)))]
+        if cameras is not None:
+            found = [_with_cameras(path, demonstration, cameras) for demonstration in found]
     else:
-        found = [read_episode(episode) for episode in episodes(path)[:count]]
+        found = [read_episode(episode, cameras) for episode in episodes(path)[:count]]
     if not found:
         raise CorruptData(path, "holds no demonstration", "record or import one into it")
     return found
@@ -40,3 +51,15 @@ def load_demonstration(path: Path, episode: int = 0) -> Demonstration:
         raise InvalidInput("episode", f"{episode}", f"0 .. {len(known) - 1} for {path}")
     found = known[episode]
     return read_episode(found) if isinstance(found, Path) else found
+
+
+def _with_cameras(path: Path, demonstration: Demonstration, cameras: Sequence[str]) -> Demonstration:
+    def seen(observation: Observation) -> Observation:
+        missing = [camera for camera in cameras if camera not in observation.views]
+        if missing:
+            problem = f"there is no view of camera {', '.join(missing)}"
+            raise CorruptData(path, problem, f"ask for those that are there: {', '.join(observation.views)}")
+        return replace(observation, views={camera: observation.views[camera] for camera in cameras})
+
+    steps = tuple(replace(k, observation=seen(k.observation)) for k in demonstration.keyframes)
+    return replace(demonstration, keyframes=steps, final=seen(demonstration.final))

@@ -9,11 +9,16 @@ from scipy.spatial.transform import Rotation
 from imop.demos import unpickle
 from imop.errors import CorruptData, InvalidInput
 from imop.geometry.se3 import from_pose7
-from imop.types import FloatArray, as_array
+from imop.types import FloatArray, as_finite, as_pose
 
 LOW_DIM = "low_dim_obs.pkl"
 
 FINGER_STROKE = 0.04
+FINGER_NOISE = 0.005
+"""Recorded fingers stand up to this far (metres) outside their stroke."""
+
+TIME_STEP = 0.05
+"""Seconds from one frame to the next."""
 
 # RLBench's model of the Panda has the zero of joint 4 turned by 4 degrees against Franka's.
 JOINT_4_OFFSET = 0.0698
@@ -40,7 +45,7 @@ class Frame:
         if not self.has(name):
             raise CorruptData(self.path, f"frame {self.index} has no {name}", "record it with this field")
         try:
-            return as_array(name, self._fields[name], shape)
+            return as_finite(name, self._fields[name], shape)
         except InvalidInput as error:
             raise CorruptData(self.path, f"frame {self.index}: {error}") from error
 
@@ -52,7 +57,11 @@ class Frame:
     @property
     def gripper_opening(self) -> float:
         """0 closed .. 1 open."""
-        fingers = self.numbers("gripper_joint_positions", (None,))
+        fingers = self.numbers("gripper_joint_positions", (2,))
+        if fingers.min() < -FINGER_NOISE or fingers.max() > FINGER_STROKE + FINGER_NOISE:
+            problem = f"frame {self.index}: gripper_joint_positions are {fingers.tolist()}"
+            remedy = f"give metres, 0 closed .. {FINGER_STROKE} open, for each of the two fingers"
+            raise CorruptData(self.path, problem, remedy)
         return float(np.clip(fingers.mean() / FINGER_STROKE, 0.0, 1.0))
 
     @property
@@ -65,19 +74,23 @@ class Frame:
     @property
     def T_world_gripper(self) -> FloatArray:
         """(4, 4); recordings by old versions of RLBench have only the quaternion."""
-        if not self.has("gripper_matrix"):
+        if self.has("gripper_matrix"):
+            return self.rigid("gripper_matrix")
+        try:
             return from_pose7(self.numbers("gripper_pose", (7,)))
-        return self.rigid("gripper_matrix")
+        except InvalidInput as error:
+            raise CorruptData(self.path, f"frame {self.index}, gripper_pose: {error}") from error
 
     def rigid(self, name: str) -> FloatArray:
-        """A (4, 4) field with the nearest rotation: rounding is mended, anything worse is not touched."""
-        T = self.numbers(name, (4, 4))
+        """A (4, 4) field with the nearest rotation: rounding is mended, anything worse refused."""
+        T = self.numbers(name, (4, 4)).copy()
         error = np.abs(T[:3, :3] @ T[:3, :3].T - np.eye(3)).max()
-        if not 1e-12 < error < 1e-3 or np.linalg.det(T[:3, :3]) < 0:
-            return T
-        mended = T.copy()
-        mended[:3, :3] = Rotation.from_matrix(T[:3, :3]).as_matrix()
-        return mended
+        if 1e-12 < error < 1e-3 and np.linalg.det(T[:3, :3]) > 0:
+            T[:3, :3] = Rotation.from_matrix(T[:3, :3]).as_matrix()
+        try:
+            return as_pose(name, T)
+        except InvalidInput as problem:
+            raise CorruptData(self.path, f"frame {self.index}, {problem}") from problem
 
 
 def read_frames(path: Path) -> list[Frame]:
@@ -87,7 +100,7 @@ def read_frames(path: Path) -> list[Frame]:
         path: the file low_dim_obs.pkl.
 
     Raises:
-        CorruptData: if it is missing, damaged, unsafe, or something else than a demonstration.
+        CorruptData: if it is missing, damaged, unsafe, empty, or something else than a demonstration.
     """
     record = unpickle.load(path)
     observations = record.fields.get("_observations") if isinstance(record, unpickle.DemoRecord) else record
@@ -95,4 +108,6 @@ def read_frames(path: Path) -> list[Frame]:
         isinstance(o, unpickle.ObservationRecord) for o in observations
     ):
         raise CorruptData(path, "does not contain a demonstration of RLBench (a Demo of Observations)")
+    if not observations:
+        raise CorruptData(path, "the demonstration has no frame")
     return [Frame(path, i, o.fields) for i, o in enumerate(observations)]

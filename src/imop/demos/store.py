@@ -23,7 +23,9 @@ from imop.errors import CorruptData, InvalidInput
 from imop.types import Demonstration
 
 FORMAT = "imop demonstrations"
-VERSION = 1
+VERSION = 2
+READABLE = (1, 2)
+"""Version 2 demands the digest of an episode's attributes; in version 1 it may be missing."""
 
 _EPISODE = re.compile(r"episode_(\d{6,})$")
 _UNFINISHED = re.compile(r"\.writing-(?P<host>.+)-(?P<pid>\d+)-[0-9a-f]+$")
@@ -54,8 +56,13 @@ class DemonstrationStore:
         return cls.open(folder)
 
     @classmethod
-    def open(cls, path: Path | str) -> "DemonstrationStore":
-        """Open a store; checks its version, that no episode is missing, and the shapes of all arrays.
+    def open(cls, path: Path | str, verify: bool = True) -> "DemonstrationStore":
+        """Open a store; checks its version.
+
+        Args:
+            path: folder or URL.
+            verify: also check all episodes: that none is missing, attributes, shapes of the arrays. Otherwise
+                what is wrong with one is found when it is read.
 
         Raises:
             InvalidInput: if there is no store at `path`.
@@ -70,11 +77,11 @@ class DemonstrationStore:
             raise CorruptData(path, f"the store cannot be opened ({error})") from error
         if group.attrs.get("format") != FORMAT:
             raise InvalidInput("path", f"the Zarr group at {path} holds no demonstrations", accepted)
-        if group.attrs.get("version") != VERSION:
-            problem = f"format version {group.attrs.get('version')}, but this imop reads version {VERSION}"
+        if group.attrs.get("version") not in READABLE:
+            problem = f"format version {group.attrs.get('version')}, but this imop reads {READABLE}"
             raise CorruptData(path, problem, "install the imop that wrote it")
         store = cls(path, group)
-        for index in range(len(store)):
+        for index in range(len(store) if verify else 0):
             store._verified(index)
         return store
 
@@ -94,14 +101,22 @@ class DemonstrationStore:
         n = len(self)
         if not -n <= index < n:
             raise IndexError(f"episode {index} of a store of {n}")
-        group, arrays = self._verified(index % n)
-        where = f"{self.path}/{group.basename}"
-        declared = cast(Any, group.attrs["arrays"])
+        where = f"{self.path}/{_name(index % n)}"
+        attributes, arrays = self._verified(index % n)
+        declared = attributes["arrays"]
         stacked = {name: _read(f"{where}/{name}", a, declared[name]["crc32"]) for name, a in arrays.items()}
         try:
-            return episode.unpack(dict(group.attrs), stacked)
-        except (KeyError, IndexError, TypeError, ValueError) as error:  # InvalidInput is a ValueError
-            raise CorruptData(where, f"the parts do not fit together ({error})") from error
+            return episode.unpack(attributes, stacked)
+        except Exception as error:  # version 1 has no digest, so attributes can be anything
+            raise CorruptData(where, f"the parts do not fit together ({error!r})") from error
+
+    def digests(self) -> set[str]:
+        """The digests of all episodes, see `imop.demos.episode.digest`.
+
+        Raises:
+            CorruptData: if the description of an episode is damaged.
+        """
+        return {episode.digest(self._verified(index)[0]) for index in range(len(self))}
 
     def append(self, demonstration: Demonstration) -> int:
         """Write `demonstration` behind the others; also removes what writers that died have left.
@@ -135,15 +150,20 @@ class DemonstrationStore:
                 raise CorruptData(self.path, f"episode_{expected:06d} is missing", remedy)
         return [name for _, name in found]
 
-    def _verified(self, index: int) -> tuple[zarr.Group, "dict[str, zarr.Array[Any]]"]:
-        """The episode's group and arrays, if the arrays have the shapes and types that were written."""
+    def _verified(self, index: int) -> "tuple[episode.Attributes, dict[str, zarr.Array[Any]]]":
+        """The episode's attributes and arrays, if all but the content of the arrays is what was written."""
         where = f"{self.path}/{_name(index)}"
         try:
             group = zarr.open_group(self._group.store, path=_name(index), mode="r")
-            declared = dict(cast(Any, group.attrs["arrays"]))
+            attributes: episode.Attributes = dict(group.attrs)
+            declared = dict(attributes["arrays"])
         except Exception as error:  # damaged JSON fails in many ways
             raise CorruptData(where, f"the episode's description is unreadable ({error!r})") from error
-        return group, {name: _described(group, f"{where}/{name}", name, declared[name]) for name in declared}
+        has_digest = "digest" in attributes or self._group.attrs["version"] != 1
+        if has_digest and attributes.get("digest") != episode.digest(attributes):
+            raise CorruptData(where, "the episode's description is not what was written (the digest differs)")
+        arrays = {name: _described(group, f"{where}/{name}", name, declared[name]) for name in declared}
+        return attributes, arrays
 
 
 def _described(group: zarr.Group, where: str, name: str, declared: Any) -> "zarr.Array[Any]":
@@ -152,10 +172,14 @@ def _described(group: zarr.Group, where: str, name: str, declared: Any) -> "zarr
         array = cast("zarr.Array[Any]", group[name])
         actual = {"shape": list(array.shape), "dtype": array.dtype.name}
         wanted = {key: declared[key] for key in actual}
+        crc32, blocks = declared["crc32"], (array.chunks, array.shards or array.chunks)
     except Exception as error:  # as above
         raise CorruptData(where, f"the array's description is missing or unreadable ({error!r})") from error
-    if actual != wanted:
-        raise CorruptData(where, f"is {actual}, was written as {wanted}")
+    if actual != wanted or not isinstance(crc32, int):
+        raise CorruptData(where, f"is {actual}, was written as {declared}")
+    # Zarr makes room for a whole block before it reads one.
+    if any(not 0 <= n <= max(m, 1) for block in blocks for n, m in zip(block, array.shape, strict=True)):
+        raise CorruptData(where, f"has blocks {blocks}, larger than its shape {array.shape}")
     return array
 
 

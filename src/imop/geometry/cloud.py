@@ -224,8 +224,10 @@ def farthest_points(points: FloatArray, count: int) -> NDArray[np.int64]:
     distance, to_newest = np.full(len(p), np.inf), np.empty(len(p))
     chosen = np.zeros(count, dtype=np.int64)
     for i in range(1, count):
-        np.dot(lifted, centres[chosen[i - 1]], out=to_newest)
+        newest = chosen[i - 1]
+        np.dot(lifted, centres[newest], out=to_newest)
         np.minimum(distance, to_newest, out=distance)
+        distance[newest] = -np.inf  # not again, even if all others lie on chosen ones
         chosen[i] = distance.argmax()
     return chosen
 

@@ -2,18 +2,18 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import dacite
-from safetensors import SafetensorError
+import torch
 from safetensors.torch import load, save
 from torch import Tensor, nn
 
 from imop.errors import CorruptData
-from imop.files import replaced
+from imop.files import read, replaced
 from imop.networks.backbone import BackboneConfig
 from imop.networks.graph import POINT_FEATURES, GraphConfig
 from imop.networks.matching import MatchingConfig, MatchingNetwork
@@ -102,6 +102,7 @@ def save_model(model: Model, folder: Path, card: Mapping[str, Any]) -> None:
         "version": VERSION,
         "sha256": hashlib.sha256(weights).hexdigest(),
         "config": asdict(model.config),
+        "config_sha256": _hash_of(asdict(model.config)),
     }
     with replaced(folder / CARD) as temporary:
         temporary.write_text(json.dumps({**card, **known}, indent=2) + "\n")
@@ -123,21 +124,64 @@ def load_model(folder: Path = BUNDLED) -> Model:
     Raises:
         CorruptData: if a file is missing, damaged, of another version, or does not fit the configuration.
     """
-    try:
-        card = json.loads((folder / CARD).read_text())
-        weights = (folder / WEIGHTS).read_bytes()
-    except (OSError, json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise CorruptData(
-            folder, f"cannot be read ({error})", f"a folder with {CARD} and {WEIGHTS}"
-        ) from error
-    if card.get("version") != VERSION:
-        raise CorruptData(folder / CARD, f"has version {card.get('version')}, not {VERSION}")
-    if hashlib.sha256(weights).hexdigest() != card.get("sha256"):
+    remedy = f"name a folder with {CARD} and {WEIGHTS}"
+    card, content = _read_card(folder / CARD, remedy), read(folder / WEIGHTS, remedy)
+    if hashlib.sha256(content).hexdigest() != card.get("sha256"):
         raise CorruptData(folder / WEIGHTS, "does not have the hash that the card names")
     try:
+        weights = load(content)
         config = dacite.from_dict(ModelConfig, card["config"], dacite.Config(cast=[tuple], strict=True))
+        _check_size(config, weights)
         model = Model(config)
-        model.load_state_dict(load(weights))
-    except (KeyError, dacite.DaciteError, SafetensorError, RuntimeError, TypeError) as error:
-        raise CorruptData(folder, f"weights and configuration do not fit ({error})") from error
+        model.load_state_dict(weights)
+    except Exception as error:  # nonsense in a configuration fails in many ways
+        raise CorruptData(folder, f"weights and configuration do not fit ({error!r})") from error
     return model.eval()
+
+
+def _read_card(path: Path, remedy: str) -> dict[str, Any]:
+    try:
+        card = json.loads(read(path, remedy))
+    except (ValueError, RecursionError) as error:
+        raise CorruptData(path, f"is not JSON ({error})", remedy) from error
+    if not isinstance(card, dict) or card.get("version") != VERSION:
+        raise CorruptData(path, f"is not a card of version {VERSION}", remedy)
+    if "config_sha256" in card and card["config_sha256"] != _hash_of(card.get("config")):
+        raise CorruptData(path, "the configuration does not have the hash that the card names")
+    return card
+
+
+def _hash_of(config: Any) -> str:
+    """SHA-256 of a configuration as JSON with sorted keys and no spaces."""
+    return hashlib.sha256(json.dumps(config, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
+def _check_size(config: ModelConfig, weights: Mapping[str, Tensor]) -> None:
+    """Refuses networks of another shape than the weights, before they take memory.
+
+    Raises:
+        ValueError: if there are more layers than tensors, or a tensor has another shape.
+    """
+    most = max(_repetitions(asdict(config)))
+    if most > len(weights):
+        raise ValueError(f"{most} layers, but {len(weights)} tensors")
+    with torch.device("meta"):
+        shapes = {name: tensor.shape for name, tensor in Model(config).state_dict().items()}
+    other = [name for name in shapes.keys() | weights if shapes.get(name) != _shape(weights.get(name))]
+    if other:
+        raise ValueError(f"tensor {min(other)} has another shape")
+
+
+def _shape(tensor: Tensor | None) -> torch.Size | None:
+    return None if tensor is None else tensor.shape
+
+
+def _repetitions(config: Mapping[str, Any]) -> Iterator[int]:
+    """How many times the networks repeat a part."""
+    for name, value in config.items():
+        if isinstance(value, dict):
+            yield from _repetitions(value)
+        elif name in ("layers", "stages"):
+            yield value
+        elif name == "depths":
+            yield from value

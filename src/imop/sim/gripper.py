@@ -17,32 +17,34 @@ PERIOD_STEPS = 25
 """Physics steps between two looks at the fingers, 0.05 s as RLBench's."""
 _MAX_PERIODS = 16
 _BLOCKED = 0.0005
+_UNMOVED = 1e-6
 _SETTLE_PERIODS = 10
 
 OnFrame = Callable[[World], None]
 
 
-def is_commanded_open(world: World) -> bool:
-    """What the gripper was last told."""
-    return bool(world.data.ctrl[world.finger_ctrl].mean() > FINGER_STROKE / 2)
-
-
-def set_gripper(world: World, gripper_open: bool, on_frame: OnFrame | None = None) -> None:
-    """Open or close, and wait until the fingers rest; nothing happens if that is the state already.
+def set_gripper(
+    world: World, gripper_open: bool, on_frame: OnFrame | None = None, opening: float | None = None
+) -> None:
+    """Open or close, and wait until the fingers rest; nothing happens if they were told so last.
 
     Args:
         world: changed in place.
         gripper_open: the wanted state.
         on_frame: called every 0.05 simulated seconds.
+        opening: where the fingers stop, 0 closed .. 1 open; at the end of their way if None. Opening
+            further lets go, closing further attaches.
     """
-    if gripper_open == is_commanded_open(world):
+    target = FINGER_STROKE * (float(gripper_open) if opening is None else opening)
+    way = target - float(world.data.ctrl[world.finger_ctrl].mean())
+    if abs(way) < _UNMOVED:
         return
-    if gripper_open:
+    if way > 0:
         release(world)
     else:
         attach(world)
-    _drive(world, FINGER_STROKE if gripper_open else 0.0, on_frame)
-    if gripper_open:
+    _drive(world, target, on_frame)
+    if way > 0:
         for _ in range(_SETTLE_PERIODS):
             _period(world, on_frame)
 

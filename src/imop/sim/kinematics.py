@@ -17,6 +17,7 @@ from imop.robots.panda import (
 from imop.types import FloatArray, as_pose
 
 _SAMPLES, _INTERVAL_DEGREES = 120, 330
+_FINE_SAMPLES, _WHOLE_RANGE_DEGREES = 12_000, 332
 _POSITION_TOLERANCE, _ROTATION_TOLERANCE = 1e-5, 1e-4
 _NEWTON_STEPS, _DAMPING = 12, 1e-3
 
@@ -37,15 +38,24 @@ def inverse_kinematics(
     T = as_pose("T_world_gripper", T_world_gripper)
     # frankik solves for the flange, although its own forward kinematics gives a point of the hand.
     T_base_flange = se3.invert(T_WORLD_BASE) @ T @ se3.invert(T_FLANGE_TIP)
-    found = frankik.ik_sample_q7(
-        T_base_flange, q_reference, sample_size=_SAMPLES, sample_interval=_INTERVAL_DEGREES, full_ik=True
-    )
-    if not found:
-        return np.empty((0, 7))
-    q: FloatArray = np.unique(np.round(np.asarray(found, dtype=np.float64), 9), axis=0)
-    q = q[np.all(np.isfinite(q) & (q >= JOINT_LOWER) & (q <= JOINT_UPPER), axis=1)]
+    q = _solutions(T_base_flange, q_reference, _SAMPLES, _INTERVAL_DEGREES)
+    if len(q) == 0:
+        # At the edge of what the arm reaches, joint 7 has only some tenths of a degree left.
+        centred = np.append(q_reference[:6], 0.0)
+        q = _solutions(T_base_flange, centred, _FINE_SAMPLES, _WHOLE_RANGE_DEGREES)
     nearest: FloatArray = q[np.argsort(np.linalg.norm(q - q_reference, axis=1), kind="stable")][:limit]
     return nearest
+
+
+def _solutions(T_base_flange: FloatArray, q_reference: FloatArray, samples: int, interval: int) -> FloatArray:
+    """(n, 7) within the joint limits, for so many values of joint 7 in an interval (degrees) around one."""
+    found = frankik.ik_sample_q7(
+        T_base_flange, q_reference, sample_size=samples, sample_interval=interval, full_ik=True
+    )
+    rows = np.asarray(found, dtype=np.float64).reshape(-1, 7)
+    q: FloatArray = np.unique(np.round(rows, 9), axis=0)
+    inside: FloatArray = q[np.all(np.isfinite(q) & (q >= JOINT_LOWER) & (q <= JOINT_UPPER), axis=1)]
+    return inside
 
 
 def reachable(T_world_gripper: FloatArray) -> bool:

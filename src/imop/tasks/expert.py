@@ -77,5 +77,5 @@ def _follow(world: World, waypoint: Waypoint, step: int, on_frame: OnFrame | Non
     plan = plan_for(world, waypoint.target(world), waypoint.allow_collisions, insist=insist)
     move(world, plan, on_frame)
     action = Action(world.T_world_gripper, waypoint.gripper_open, waypoint.allow_collisions)
-    set_gripper(world, waypoint.gripper_open, on_frame)
+    set_gripper(world, waypoint.gripper_open, on_frame, waypoint.opening)
     return Keyframe(observation, action, waypoint.frame, T_world_object)

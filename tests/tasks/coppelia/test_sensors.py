@@ -82,12 +82,24 @@ def test_the_volume_moves_with_its_parent(cupboard_model):
     assert not detects(world, cupboard_model, "inside", "ball")
 
 
-def test_only_sensors_detect_and_only_shapes_are_detected(cupboard_model):
+def test_a_dummy_is_detected_where_its_origin_is(cupboard_model):
+    world = world_of(cupboard_model)
+    T = world.pose("inside")
+    lower, upper = volume(cupboard_model["inside"]).corners[[0, -1], 2]
+    for z in (lower - 0.002, lower + 0.002, upper - 0.002, upper + 0.002):
+        place(world, cupboard_model, "waypoint0", T @ se3.make(p=(0, 0, z)))
+        assert detects(world, cupboard_model, "inside", "waypoint0") is bool(lower < z < upper)
+    place(world, cupboard_model, "waypoint0", T @ se3.make(p=(0.1, 0, (lower + upper) / 2)))
+    assert not detects(world, cupboard_model, "inside", "waypoint0")
+
+
+def test_only_sensors_detect_and_neither_joints_nor_sensors_are_detected(cupboard_model):
     world = world_of(cupboard_model)
     with pytest.raises(InvalidInput, match="proximity sensor"):
         detects(world, cupboard_model, "frame", "ball")
-    with pytest.raises(InvalidInput, match="shape"):
-        detects(world, cupboard_model, "inside", "waypoint0")
+    for name in ("slide", "inside"):
+        with pytest.raises(InvalidInput, match="shape or a dummy"):
+            detects(world, cupboard_model, "inside", name)
 
 
 def test_one_sided_sensors_see_what_looks_towards_them():

@@ -4,6 +4,7 @@ from imop.errors import AssetMissing, InvalidInput
 from imop.tasks.env import make_task
 from imop.tasks.rlbench import assets
 from imop.tasks.task import make_scene
+from tests.tasks.coppelia import writer
 from tests.tasks.coppelia.conftest import cupboard
 
 
@@ -18,17 +19,29 @@ def test_a_missing_file_is_named_with_the_command_that_provides_it():
     assert not make_task("rlbench/turn_tap").available()
 
 
-def test_wanted_files_are_found_anywhere_and_broken_ones_are_told(tmp_path):
+def test_all_files_are_found_anywhere_and_broken_ones_are_told(tmp_path):
     source = tmp_path / "rlbench" / "task_ttms"
     source.mkdir(parents=True)
     for name in ("lamp_on", "other"):
         (source / f"{name}.ttm").write_bytes(cupboard())
     (source / "open_box.ttm").write_bytes(cupboard()[:-9])
-    problems = assets.install(tmp_path, ["lamp_on", "open_box", "turn_tap"])
-    assert problems["lamp_on"] == "" and "byte" in problems["open_box"]
-    assert set(problems) == {"lamp_on", "open_box"}
-    assert assets.available("lamp_on") and not assets.available("open_box") and not assets.available("other")
+    done = assets.install(tmp_path, ["lamp_on", "open_box", "turn_tap"])
+    assert done["lamp_on"].error == "" and "byte" in done["open_box"].error
+    assert set(done) == {"lamp_on", "open_box", "other"}
+    assert assets.available("lamp_on") and not assets.available("open_box")
     assert "waypoint0" in assets.load("lamp_on").index
+
+
+def test_a_model_for_a_task_of_ones_own_is_there_and_what_it_lacks_is_said(tmp_path):
+    source = tmp_path / "source"
+    source.mkdir()
+    jar = writer.ttm(writer.arrays(writer.box_mesh()), writer.shape("jar", 1))
+    (source / "jar.ttm").write_bytes(jar)
+    (source / "cupboard.ttm").write_bytes(cupboard())
+    done = assets.install(source)
+    assert assets.available("jar") and assets.available("cupboard")
+    assert done["cupboard"].lacks == ()
+    assert any("waypoint0" in lack for lack in done["jar"].lacks)
 
 
 def test_a_changed_file_is_read_again(tmp_path):

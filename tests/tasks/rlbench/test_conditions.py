@@ -1,4 +1,4 @@
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pytest
 from hypothesis import given
@@ -46,11 +46,14 @@ def test_several_are_counted_once_each(scene):
         assert DetectedSeveral(("ball", "area"), ("inside", "inside"), count).met(scene) == met
 
 
+@pytest.mark.parametrize("begun", [0.1, 0.2])
 @pytest.mark.parametrize("by", [0.05, -0.05])
-def test_a_joint_moves_either_way_from_where_the_file_has_it(scene, by):
+def test_a_joint_moves_either_way_from_where_the_episode_began(scene, begun, by):
+    scene.world.set_joint("slide", begun)
+    scene = replace(scene, begun=scene.joints())
     condition = JointMoved("slide", 0.04)
     assert not condition.met(scene)
-    scene.world.set_joint("slide", 0.1 + by)
+    scene.world.set_joint("slide", begun + by)
     assert condition.met(scene)
     assert not JointMoved("slide", 0.06).met(scene)
 

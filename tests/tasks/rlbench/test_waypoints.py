@@ -13,11 +13,11 @@ from imop.tasks.rlbench.waypoints import Words, numbered, path_poses, read_words
     [
         ("", Words(False, False, None)),
         ("ignore_collisions;linear", Words(True, True, None)),
-        ("close_gripper()", Words(False, False, False)),
-        ("open_gripper(); ignore_collisions", Words(True, False, True)),
-        ("close_gripper(0.6),ignore_collisions", Words(True, False, False)),
-        ("open_gripper(0.1); ignore_collisions", Words(True, False, False)),
-        ("ignore_collision;open_gripper();linear", Words(True, True, True)),
+        ("close_gripper()", Words(False, False, 0.0)),
+        ("open_gripper(); ignore_collisions", Words(True, False, 1.0)),
+        ("close_gripper(0.6),ignore_collisions", Words(True, False, 0.6)),
+        ("open_gripper(0.1); ignore_collisions", Words(True, False, 0.1)),
+        ("ignore_collision;open_gripper();linear", Words(True, True, 1.0)),
     ],
 )
 def test_words_of_a_waypoint(extension, words):

@@ -6,9 +6,11 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from imop.geometry import se3
 from imop.tasks.coppelia.model import Model, Piece, Shape
+from imop.tasks.coppelia.parts import convex_parts, is_convex
 from imop.types import FloatArray
 
 SEEN_GROUP, UNSEEN_GROUP = 0, 3
@@ -40,6 +42,19 @@ class Assets:
     meshes: dict[tuple[int, int, int, bool], str] = field(default_factory=dict)
     materials: dict[int, str] = field(default_factory=dict)
     joined: dict[Any, Piece] = field(default_factory=dict)
+    apart: dict[tuple[int, int], list[Piece]] = field(default_factory=dict)
+
+    def parts(self, piece: Piece) -> list[Piece]:
+        """Convex pieces that fill a piece: itself, or the parts of a mesh that is not convex.
+
+        Raises:
+            MissingExtra: if there are parts to be made and coacd is not installed.
+        """
+        key = (id(piece.vertices), id(piece.triangles))
+        if key not in self.apart:
+            corners = [] if is_convex(piece) else convex_parts(piece)
+            self.apart[key] = [_solid(points) for points in corners] or [piece]
+        return self.apart[key]
 
     def mesh(self, piece: Piece, hull: bool) -> str | None:
         """Name of the piece's mesh, None if it has no surface; with `hull` only its convex hull counts."""
@@ -86,6 +101,18 @@ class Assets:
         return self.materials[picture]
 
 
+def _solid(corners: FloatArray) -> Piece:
+    """The hull of corners (n, 3), not drawn."""
+    return Piece(
+        primitive=None,
+        size=(0.0, 0.0, 0.0),
+        T_shape_mesh=np.eye(4),
+        vertices=corners.astype(np.float32),
+        triangles=ConvexHull(corners).simplices.astype(np.int32),
+        color=(0.0, 0.0, 0.0),
+    )
+
+
 def _averaged(pixels: Any, step: int) -> Any:
     """The picture (h, w, 3) with squares of `step` pixels averaged to one."""
     h, w = (max(1, n // step) for n in pixels.shape[:2])
@@ -124,9 +151,8 @@ def add_geoms(assets: Assets, body: Any, shape: Shape) -> None:
         if drawn:
             meshes.append(piece)
         if shape.respondable:
-            solid = primitive or _hull(assets, piece)
-            if solid is not None:
-                _add(body, piece, solid, f"{name}:{k}:solid", shape, drawn=False, solid=True)
+            for j, solid in enumerate([primitive] if primitive else _hulls(assets, piece)):
+                _add(body, piece, solid, f"{name}:{k}:solid{j or ''}", shape, drawn=False, solid=True)
     for k, piece in enumerate(_joined(assets, meshes)):
         mesh = assets.mesh(piece, hull=False)
         if mesh is not None:
@@ -169,9 +195,9 @@ def _join(pieces: list[Piece]) -> Piece:
     )
 
 
-def _hull(assets: Assets, piece: Piece) -> dict[str, Any] | None:
-    mesh = assets.mesh(piece, hull=True)
-    return None if mesh is None else {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": mesh}
+def _hulls(assets: Assets, piece: Piece) -> list[dict[str, Any]]:
+    meshes = [assets.mesh(part, hull=True) for part in assets.parts(piece)]
+    return [{"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": mesh} for mesh in meshes if mesh is not None]
 
 
 def _primitive(piece: Piece, solid: bool) -> dict[str, Any] | None:

@@ -1,4 +1,4 @@
-"""Proximity sensors: whether a shape's surface passes through a volume.
+"""Proximity sensors: whether a shape's surface passes through a volume, or a dummy's origin lies in it.
 
 A solid that encloses the whole volume is not detected, as in the program: surfaces count, not insides.
 """
@@ -11,7 +11,7 @@ import numpy as np
 from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.sim.world import World
-from imop.tasks.coppelia.model import Model, ProximitySensor, Shape
+from imop.tasks.coppelia.model import Dummy, Model, ProximitySensor, Shape
 from imop.types import BoolArray, FloatArray
 
 _SIDES = 24
@@ -83,20 +83,21 @@ def intersects(volume: Volume, triangles: FloatArray) -> BoolArray:
     return meets
 
 
-def detects(world: World, model: Model, sensor: str, shape: str, prefix: str = "") -> bool:
-    """Whether a sensor detects a shape now; the shape's own surface counts, not that of what hangs on it.
+def detects(world: World, model: Model, sensor: str, name: str, prefix: str = "") -> bool:
+    """Whether a sensor detects a shape's own surface, not what hangs on it, or a dummy's origin now.
 
     Raises:
-        InvalidInput: if they are not a sensor and a shape of the model.
+        InvalidInput: if they are not a sensor, and a shape or dummy, of the model.
     """
-    detector, target = model[sensor], model[shape]
+    detector, target = model[sensor], model[name]
     if not isinstance(detector, ProximitySensor):
         raise InvalidInput("sensor", sensor, "the name of a proximity sensor")
-    if not isinstance(target, Shape):
-        raise InvalidInput("shape", shape, "the name of a shape")
-    T_sensor_shape = se3.invert(world.pose(prefix + sensor)) @ world.pose(prefix + shape)
-    triangles = se3.apply(T_sensor_shape, target.corners.reshape(-1, 3)).reshape(-1, 3, 3)
-    if not (detector.front_faces and detector.back_faces):
+    if not isinstance(target, Shape | Dummy):
+        raise InvalidInput("name", f"{name} is neither", "the name of a shape or a dummy")
+    corners = target.corners if isinstance(target, Shape) else np.zeros((1, 3, 3))
+    T_sensor_target = se3.invert(world.pose(prefix + sensor)) @ world.pose(prefix + name)
+    triangles = se3.apply(T_sensor_target, corners.reshape(-1, 3)).reshape(-1, 3, 3)
+    if isinstance(target, Shape) and not (detector.front_faces and detector.back_faces):
         normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         towards = np.einsum("ti,ti->t", normal, triangles.mean(axis=1)) < 0
         triangles = triangles[towards if detector.front_faces else ~towards]

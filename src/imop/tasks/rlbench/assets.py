@@ -1,14 +1,19 @@
 """Where the tasks' model files are kept: copies in the user's cache, unpacked once."""
 
 import shutil
-from collections.abc import Iterable
+from collections.abc import Collection
+from contextlib import suppress
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from imop.errors import AssetMissing, InvalidInput, ModelFormatError
+from imop.errors import AssetMissing, InvalidInput, MissingExtra, ModelFormatError
 from imop.files import replaced, user_cache
 from imop.tasks.coppelia.cache import load_model
-from imop.tasks.coppelia.model import Model
+from imop.tasks.coppelia.lacks import lacks
+from imop.tasks.coppelia.model import Model, Shape
+from imop.tasks.coppelia.parts import convex_parts, is_convex
+from imop.tasks.rlbench.waypoints import numbered
 
 SOURCE = "https://github.com/stepjam/RLBench (or the fork of PerAct), folder rlbench/task_ttms"
 COMMAND = "imop assets rlbench --from PATH"
@@ -50,34 +55,60 @@ def find(source: Path) -> dict[str, Path]:
     """
     if not source.is_dir():
         raise InvalidInput("from", f"{source} is no folder", f"a copy of {SOURCE}")
-    found = {path.stem: path for path in sorted(source.rglob("*.ttm"), reverse=True)}
+    paths = (path for path in sorted(source.rglob("*.ttm"), reverse=True) if path.is_file())
+    found = {path.stem: path for path in paths}
     if not found:
         raise InvalidInput("from", f"no .ttm file below {source}", f"a copy of {SOURCE}")
     return found
 
 
-def install(source: Path, files: Iterable[str]) -> dict[str, str]:
-    """Copy model files into the user's cache and unpack them there.
+@dataclass(frozen=True)
+class Installed:
+    """What became of a file.
+
+    Attributes:
+        error: why it cannot be read; it was not copied then.
+        lacks: what of it will not be as in the program.
+    """
+
+    error: str = ""
+    lacks: tuple[str, ...] = ()
+
+
+def install(source: Path, known: Collection[str] = ()) -> dict[str, Installed]:
+    """Copy all model files that can be read into the user's cache and unpack them there.
 
     Args:
         source: a folder, searched with all below it.
-        files: names without .ttm of the models that are wanted.
+        known: names without .ttm of models whose tasks are written: these deal with what the models lack.
 
     Returns:
-        File name -> what is wrong with it, or nothing; files that were not found are left out.
+        What became of every file, by its name without .ttm.
 
     Raises:
         InvalidInput: if `source` is no folder, or has no models.
     """
-    found, problems = find(source), {}
-    for file in files:
-        if file in found:
-            try:
-                load_model(found[file])
-            except ModelFormatError as error:
-                problems[file] = str(error)
-                continue
-            with replaced(folder() / f"{file}.ttm") as temporary:
-                shutil.copyfile(found[file], temporary)
-            problems[file] = ""
-    return problems
+    done = {}
+    for file, path in find(source).items():
+        try:
+            model = load_model(path)
+        except ModelFormatError as error:
+            done[file] = Installed(error=str(error))
+            continue
+        with replaced(folder() / f"{file}.ttm") as temporary:
+            shutil.copyfile(path, temporary)
+        done[file] = Installed()
+        if file not in known:
+            _take_apart(model)
+            waypoints = [] if numbered(model) else ["there is no waypoint0: say the expert's steps yourself"]
+            done[file] = Installed(lacks=(*lacks(model), *waypoints))
+    return done
+
+
+def _take_apart(model: Model) -> None:
+    """Make and keep the convex parts now, so that no scene waits for them."""
+    solid = (o for o in model.objects if isinstance(o, Shape) and o.respondable)
+    pieces = [piece for o in solid for piece in o.pieces if not is_convex(piece)]
+    with suppress(MissingExtra):  # said when a scene is made of it
+        for piece in pieces:
+            convex_parts(piece)

@@ -17,28 +17,28 @@ class Condition(Protocol):
 
 @dataclass(frozen=True)
 class Detected:
-    """A sensor detects a shape, or, negated, does not."""
+    """A sensor detects a shape or a dummy, or, negated, does not."""
 
-    shape: str
+    thing: str
     sensor: str
     negated: bool = False
 
     def met(self, scene: Scene) -> bool:
         """Whether it is met now."""
-        return scene.detects(self.sensor, self.shape) != self.negated
+        return scene.detects(self.sensor, self.thing) != self.negated
 
 
 @dataclass(frozen=True)
 class DetectedSeveral:
-    """At least so many of these shapes are detected, each by any of these sensors."""
+    """At least so many of these shapes or dummies are detected, each by any of these sensors."""
 
-    shapes: tuple[str, ...]
+    things: tuple[str, ...]
     sensors: tuple[str, ...]
     count: int
 
     def met(self, scene: Scene) -> bool:
         """Whether it is met now."""
-        found = [any(scene.detects(sensor, shape) for sensor in self.sensors) for shape in self.shapes]
+        found = [any(scene.detects(sensor, thing) for sensor in self.sensors) for thing in self.things]
         return sum(found) >= self.count
 
 
@@ -64,7 +64,7 @@ class Grasped:
 
 @dataclass(frozen=True)
 class JointMoved:
-    """A joint is farther than `least` (radians or metres) from where it is in the file, either way."""
+    """A joint is farther than `least` (radians or metres) from where the episode began, either way."""
 
     joint: str
     least: float

@@ -1,10 +1,11 @@
 """A world together with the model that it was made of: objects by the names in the file."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from imop.geometry import se3
 from imop.sim.world import World
+from imop.tasks.coppelia.dynamics import is_moving_joint
 from imop.tasks.coppelia.model import Joint, Model
 from imop.tasks.coppelia.placing import place, place_position, recolor
 from imop.tasks.coppelia.sensors import detects
@@ -14,10 +15,17 @@ from imop.types import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What a task's logic reads and moves. Moving an object moves all below it in the file's tree."""
+    """What a task's logic reads and moves. Moving an object moves all below it in the file's tree.
+
+    Attributes:
+        world: where everything is now.
+        model: what the file says.
+        begun: joint -> position (radians or metres) with which the episode began; the file's for others.
+    """
 
     world: World
     model: Model
+    begun: Mapping[str, float] = field(default_factory=dict)
 
     def pose(self, name: str, frame: str | None = None) -> FloatArray:
         """(4, 4) in the world, or in the frame of another object."""
@@ -56,12 +64,18 @@ class Scene:
         """Let go what a weld holds; nothing happens if that was done."""
         self.world.data.eq_active[self.world.model.equality(weld).id] = 0
 
-    def detects(self, sensor: str, shape: str) -> bool:
-        """Whether a sensor detects a shape now."""
-        return detects(self.world, self.model, sensor, shape)
+    def detects(self, sensor: str, name: str) -> bool:
+        """Whether a sensor detects a shape or a dummy now."""
+        return detects(self.world, self.model, sensor, name)
+
+    def joints(self) -> dict[str, float]:
+        """Position of every hinge (radians) and slide (metres) that moves."""
+        moving = (o for i, o in enumerate(self.model.objects) if is_moving_joint(self.model, i))
+        names = [o.name for o in moving if isinstance(o, Joint) and o.kind != "spherical"]
+        return {name: self.world.joint(name) for name in names}
 
     def moved(self, joint: str) -> float:
-        """How far a joint is from its position in the file, radians or metres."""
+        """How far a joint is from where the episode began, radians or metres."""
         start = self.model[joint]
         assert isinstance(start, Joint)
-        return abs(self.world.joint(joint) - start.position)
+        return abs(self.world.joint(joint) - self.begun.get(joint, start.position))

@@ -23,7 +23,7 @@ from imop.tasks.rlbench.conditions import Condition
 from imop.tasks.rlbench.instances import separate, unavoided
 from imop.tasks.rlbench.scene import Scene
 from imop.tasks.rlbench.spawn import WORKSPACE, Boundary, area, place_in
-from imop.tasks.rlbench.waypoints import numbered, path_poses, read_words, thing_of
+from imop.tasks.rlbench.waypoints import OPEN, numbered, path_poses, read_words, thing_of
 from imop.tasks.task import Task
 from imop.tasks.waypoint import Waypoint
 from imop.types import FloatArray
@@ -104,7 +104,7 @@ class RLBenchTask(Task):
 
     @abstractmethod
     def conditions(self) -> Sequence[Condition]:
-        """What has to be met at once for success; made anew for every episode."""
+        """What has to be met at once for success; made anew for every episode, after `init_episode`."""
 
     def fails(self) -> Sequence[Condition]:
         """What makes success impossible once it was met at once; nothing by default."""
@@ -162,8 +162,9 @@ class RLBenchTask(Task):
             ]
 
         def draw() -> str:
-            self._conditions, self._fails, self._failed = self.conditions(), self.fails(), False
             self.init_episode(scene, rng)
+            self._begun = scene.joints()
+            self._conditions, self._fails, self._failed = self.conditions(), self.fails(), False
             if self.placed:
                 self._place(scene, rng)
             return self._problem(world)
@@ -206,7 +207,7 @@ class RLBenchTask(Task):
         return ""
 
     def waypoints(self, world: World) -> Sequence[Waypoint]:
-        scene, gripper_open, found = Scene(world, self.model), True, []
+        scene, opening, found = Scene(world, self.model), 1.0, []
         p_before = world.T_world_gripper[:3, 3]
         for step in self.steps(scene):
             words = read_words(self.model[step.waypoint].extension)
@@ -214,30 +215,34 @@ class RLBenchTask(Task):
             frame = step.frame or self.frames.get(step.waypoint) or thing_of(self.model, step.waypoint)
             o = self.model[step.waypoint]
             poses = T @ path_poses(o) if isinstance(o, PathObject) else T[None].copy()
+            # RLBench follows paths without a look at what is in the way, whatever their words say.
+            free = words.ignore_collisions or isinstance(o, PathObject)
             # Things that sank onto the table may put waypoints below the workspace, by two millimetres.
             poses[:, 2, 3] = np.maximum(poses[:, 2, 3], WORKSPACE_LOWER[2] + INSIDE)
             T_frame_poses = se3.invert(scene.pose(frame)) @ poses
             for k, T_frame_gripper in enumerate(T_frame_poses):
                 last = k == len(poses) - 1
-                gripper_before = gripper_open
-                gripper_open = words.gripper_open if last and words.gripper_open is not None else gripper_open
                 # What is turned in place would be dragged away on any other way.
-                in_place = np.linalg.norm(poses[k, :3, 3] - p_before) < _IN_PLACE and not gripper_before
+                in_place = np.linalg.norm(poses[k, :3, 3] - p_before) < _IN_PLACE and opening <= OPEN
                 linear = words.linear or len(poses) > 1 or bool(in_place)
                 p_before = poses[k, :3, 3]
-                found.append(Waypoint(frame, T_frame_gripper, gripper_open, words.ignore_collisions, linear))
+                opening = words.opening if last and words.opening is not None else opening
+                found.append(Waypoint(frame, T_frame_gripper, opening > OPEN, free, linear, opening))
         return found
 
     def watch(self, world: World) -> None:
-        scene = Scene(world, self.model)
+        scene = self._scene(world)
         self._met(scene)
         self.on_step(scene)
+
+    def _scene(self, world: World) -> Scene:
+        return Scene(world, self.model, self._begun)
 
     def on_step(self, scene: Scene) -> None:
         """Change what the task changes while it is done, such as a lock; every 0.05 s, nothing by default."""
 
     def success(self, world: World) -> bool:
-        return self._met(Scene(world, self.model))
+        return self._met(self._scene(world))
 
     def _met(self, scene: Scene) -> bool:
         met = [c.met(scene) for c in self._conditions]

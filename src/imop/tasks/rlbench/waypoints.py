@@ -10,7 +10,7 @@ from imop.tasks.coppelia.model import Model, PathObject, SceneObject, Shape
 from imop.types import FloatArray
 
 _GRIPPER = re.compile(r"(open|close)_gripper\(\s*([0-9.]*)\s*\)")
-_OPEN = 0.9
+OPEN = 0.9
 """Opening from which the gripper counts as open."""
 _PATH_STEP, _PATH_TURN = 0.12, np.radians(30.0)
 """Along a curve one step reaches so far, at most."""
@@ -23,20 +23,20 @@ class Words:
     Attributes:
         ignore_collisions: whether the motion may touch things.
         linear: whether only a straight line will do.
-        gripper_open: state of the gripper afterwards, None for the state before.
+        opening: of the gripper afterwards, 0 closed .. 1 open; None for that before.
     """
 
     ignore_collisions: bool
     linear: bool
-    gripper_open: bool | None
+    opening: float | None
 
 
 def read_words(extension: str) -> Words:
     """The meaning of an extension string."""
-    gripper = None
+    opening = None
     for word, amount in _GRIPPER.findall(extension):
-        gripper = float(amount or word == "open") > _OPEN
-    return Words("ignore_collision" in extension, "linear" in extension, gripper)
+        opening = float(amount or word == "open")
+    return Words("ignore_collision" in extension, "linear" in extension, opening)
 
 
 def numbered(model: Model) -> list[str]:
