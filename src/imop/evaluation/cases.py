@@ -100,7 +100,7 @@ def simulated_cases(trials: Mapping[str, Sequence[Trial]], cache: Path) -> list[
 
 def _simulated_case(task: str, trials: list[Trial], cache: Path) -> Case:
     """The demonstration and the scenes of one task and variation, but for scenes that the expert fails in."""
-    recordings = Recordings(cache)
+    recordings = Recordings(cache, trials[0].task)
     shown = recordings.demonstration(trials[0])
     scenes = {str(trial.seed): recordings.scene(trial) for trial in trials}
     queries = {name: scene for name, scene in scenes.items() if scene is not None}

@@ -1,6 +1,7 @@
 """Demonstrations of the expert that are recorded once and kept in a folder."""
 
 import json
+import re
 from dataclasses import asdict
 from pathlib import Path
 
@@ -11,27 +12,30 @@ import imop.sim
 import imop.tasks
 from imop.demos.store import DemonstrationStore
 from imop.errors import InvalidInput
-from imop.evaluation.fingerprint import code_digest
+from imop.evaluation.fingerprint import code_digest, own_code_digest
 from imop.evaluation.trials import DEMONSTRATION_SEED, Trial, demonstration_for
 from imop.files import replaced
 from imop.sim.world import World, scene_spec
 from imop.tasks.env import make_task
 from imop.tasks.expert import ExpertFailed, record_demonstration
 from imop.tasks.layout import NoRoom
+from imop.tasks.suites import find_task
 from imop.types import Demonstration
 
 
 class Recordings:
-    """What the expert does in given scenes; recorded when first asked for.
+    """What the expert does in scenes of a task; recorded when first asked for.
 
     Recordings of another state of the simulator's or the tasks' code are not used.
 
     Args:
-        folder: where they are kept, for all states of the code.
+        folder: where they are kept, for all tasks and states of the code.
+        task: name of the task, whose code counts, too, if it is one's own.
     """
 
-    def __init__(self, folder: Path):
-        path = folder / f"recordings-{code_digest(imop.sim, imop.robots, imop.tasks)}"
+    def __init__(self, folder: Path, task: str):
+        state = [code_digest(imop.sim, imop.robots, imop.tasks), *own_code_digest(find_task(task))]
+        path = folder / "-".join(["recordings", *state])
         self._failed = path / "failed"
         try:
             self._store = DemonstrationStore.open(path / "demos.zarr")
@@ -47,7 +51,7 @@ class Recordings:
         """What the expert does in the trial's scene; None if it fails there."""
         if trial in self._numbers:
             return self._store[self._numbers[trial]]
-        failure = self._failed / "-".join(str(v).replace("/", "_") for v in asdict(trial).values())
+        failure = self._failed / "-".join(re.sub(r"\W", "_", str(v)) for v in asdict(trial).values())
         if failure.exists():
             return None
         try:
