@@ -1,6 +1,8 @@
 """The task of one's own that docs/rlbench.md shows, as a user has it: a file outside the package."""
 
+import itertools
 import runpy
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -26,6 +28,12 @@ def test_the_expert_closes_the_drawer_that_stands_open(seed):
     perform(task, world)
     assert task.success(world)
     assert world.joint(task.joint) < 0.02
+
+
+def test_the_docs_show_the_code_that_is_tested():
+    docs = (EXAMPLE.parents[1] / "docs" / "rlbench.md").read_text().split("The heart of it:\n\n")[1]
+    block = "\n".join(itertools.takewhile(lambda line: not line.startswith("|"), docs.splitlines()))
+    assert textwrap.dedent(block).strip() in textwrap.dedent(EXAMPLE.read_text().replace("\n    ", "\n"))
 
 
 def test_it_is_as_short_as_the_docs_say():

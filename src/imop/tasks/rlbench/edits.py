@@ -1,4 +1,4 @@
-"""Changes of a model before it is converted, where our physics needs another tree or other solids."""
+"""Changes of a model before it is converted, where our physics needs another tree, solids or words."""
 
 from dataclasses import replace
 
@@ -36,6 +36,16 @@ def hollow(model: Model, name: str) -> Model:
     """
     part = _shape(model, name)
     return _with(model, part, replace(part, respondable=False))
+
+
+def reworded(model: Model, waypoint: str, words: str) -> Model:
+    """The model with other words on a waypoint.
+
+    Raises:
+        InvalidInput: if there is no such object.
+    """
+    part = model[waypoint]
+    return _with(model, part, replace(part, extension=words))
 
 
 def _shape(model: Model, name: str) -> Shape:
