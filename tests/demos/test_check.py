@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from imop.demos.agreement import contradictions, find_disagreement, reordered_quaternion
 from imop.demos.check import check
@@ -162,6 +163,70 @@ def test_known_mistakes_of_camera_poses_are_named(change, words, cameras):
     )
     found = [f for f in findings(wrong) if "camera" in f.where]
     assert words in only(found).remedy
+
+
+def like_kinect(demonstration, seed, larger=1.0):
+    """As a Kinect sees it, in a scene `larger` times as large, with poses wrong by 3 mm and 0.25 degrees.
+
+    Depth is off by 2.85 mm at 1 m, growing with its square, half of it the same for neighbours; pixels show
+    what their neighbours should; edges have holes.
+    """
+    rng = np.random.default_rng(seed)
+    errors = {}
+    for name in CAMERAS:
+        p, r = (e / np.linalg.norm(e) for e in rng.normal(size=(2, 3)))
+        errors[name] = se3.make(se3.euler(*np.deg2rad(0.25) * r), 0.003 * p)
+
+    def change(k, name, view):
+        z = larger * view.depth.astype(np.float64)
+        edge = ndimage.maximum_filter(z, 3) - ndimage.minimum_filter(z, 3) > 0.02 * larger
+        pixels = np.indices(z.shape) + np.rint(rng.normal(0, 0.5, (2, *z.shape))).astype(int)
+        z = z[tuple(np.clip(pixels, 0, len(z) - 1))]
+        smooth = ndimage.gaussian_filter(rng.normal(size=z.shape), 1.5)
+        noise = (rng.normal(size=z.shape) + smooth / smooth.std()) / np.sqrt(2)
+        z = np.where(edge & (rng.random(z.shape) < 0.3), 0, np.maximum(z + 2.85e-3 * z**2 * noise, 0))
+        T = view.T_world_camera.copy()
+        T[:3, 3] *= larger
+        return replace(view, depth=z, T_world_camera=T @ errors[name])
+
+    return with_views(demonstration, change)
+
+
+def disagreement(demonstration):
+    """Findings about cameras that contradict each other."""
+    views = with_observations(demonstration, lambda k, o: replace(o, joint_positions=None))
+    return [f for f in findings(views) if "contradicts" in f.problem]
+
+
+@pytest.mark.parametrize("larger", [1.0, 1.6, 2.5])
+@pytest.mark.parametrize("seed", range(3))
+def test_good_views_of_a_real_camera_are_no_errors(seed, larger):
+    found = disagreement(like_kinect(lift_a_cube(), seed, larger))
+    assert not [f for f in found if f.severity == "error"]
+
+
+@pytest.mark.parametrize(
+    "T",
+    [
+        se3.make(p=(0, 0.02, 0)),
+        se3.make(se3.euler(x=np.deg2rad(2.0))),
+        se3.make(se3.euler(y=np.deg2rad(-2.0))),
+    ],
+)
+def test_displaced_real_cameras_are_errors(T):
+    found = disagreement(like_kinect(moved("front", T), 0))
+    assert found and all(f.severity == "error" and "front" in f.where for f in found)
+
+
+def test_quaternion_order_of_a_real_camera_is_named():
+    wrong = with_views(
+        like_kinect(lift_a_cube(), 0),
+        lambda k, n, v: (
+            replace(v, T_world_camera=reordered_quaternion(v.T_world_camera)[0]) if n == "front" else v
+        ),
+    )
+    found = only([f for f in findings(wrong) if "camera front" in f.where])
+    assert found.severity == "error" and "in the order wxyz instead of xyzw" in found.remedy
 
 
 def test_reordering_is_what_it_says():
