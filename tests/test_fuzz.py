@@ -26,7 +26,7 @@ from imop.networks.model import CARD, SMALL, WEIGHTS, Model, load_model, save_mo
 from imop.networks.routing import RoutingConfig
 from imop.tasks.coppelia.reader import read_model
 from tests.demos.rlbench_files import dump_demo, frames_of
-from tests.demos.scenes import lift_a_cube, with_views
+from tests.demos.scenes import assert_same, lift_a_cube, with_views
 from tests.tasks.coppelia.conftest import cupboard
 
 SAMPLE = 40
@@ -122,19 +122,24 @@ class Store(Files):
             for k in one.keyframes
         )
         final = replace(one.final, views={"front": one.final.views["front"]})
-        store = DemonstrationStore.create(self.good / "store")
-        store.append(replace(one, keyframes=steps, final=final))
+        self.demonstration = replace(one, keyframes=steps, final=final)
+        DemonstrationStore.create(self.good / "store").append(self.demonstration)
 
     def mend(self, rng):
         """Half of the stores are of version 1, whose attributes no digest protects."""
-        if rng.random() < 0.5:
+        self.protected = rng.random() < 0.5
+        if not self.protected:
             for file in (self.copy / "store" / "zarr.json", self.copy / "store/episode_000000/zarr.json"):
                 text = file.read_bytes().replace(b'"version": 2', b'"version": 1')
                 file.write_bytes(re.sub(rb'"digest": "[0-9a-f]*"', b'"other": 0', text))
 
     def read(self):
         assert isinstance(check(self.copy / "store"), list)
-        assert len(list(DemonstrationStore.open(self.copy / "store"))) <= 1
+        found = list(DemonstrationStore.open(self.copy / "store"))
+        assert len(found) <= 1
+        if self.protected:
+            for demonstration in found:
+                assert_same(demonstration, self.demonstration)
 
 
 class Weights(Files):

@@ -42,6 +42,7 @@ MIRROR = np.diag([1.0, 1.0, -1.0, 1.0])
         (lambda: view(intrinsics=[[1, 1, 0], [1, 1, 0], [0, 0, 1]]), "intrinsics"),
         (lambda: view(intrinsics=[[1, np.inf, 0], [0, 1, 0], [0, 0, 1]]), "intrinsics"),
         (lambda: view(T_world_camera=2 * np.eye(4)), "T_world_camera"),
+        (lambda: view(T_world_camera=1e300 * np.eye(4)), "T_world_camera"),
         (lambda: view(T_world_camera=MIRROR), "T_world_camera"),
         (lambda: view(instance_ids=np.zeros(3)), "instance_ids"),
         (lambda: observation(views={}), "views"),

@@ -69,6 +69,11 @@ def _check_integers(name: str, given: NDArray[Any], limits: np.iinfo[Any]) -> No
         raise InvalidInput(name, f"integers from {given.min()} to {given.max()}", accepted)
 
 
+def rotation_error(R: FloatArray) -> float:
+    """How far (3, 3) is from orthonormal: the largest error in R R^T, infinite if R is absurd."""
+    return float(np.abs(R @ R.T - np.eye(3)).max()) if np.abs(R).max() < 1e3 else np.inf
+
+
 def as_pose(name: str, value: Any) -> FloatArray:
     """Convert `value` to a rigid transformation, (4, 4) float64.
 
@@ -80,7 +85,7 @@ def as_pose(name: str, value: Any) -> FloatArray:
     if not np.all(np.isfinite(T)):
         raise InvalidInput(name, "not finite", accepted)
     R = T[:3, :3]
-    if np.abs(R @ R.T - np.eye(3)).max() > 1e-4 or np.linalg.det(R) < 0:
+    if rotation_error(R) > 1e-4 or np.linalg.det(R) < 0:
         raise InvalidInput(name, "rotation is not orthonormal and right-handed", accepted)
     if not np.allclose(T[3], (0, 0, 0, 1), atol=1e-8):
         raise InvalidInput(name, f"last row is {T[3].tolist()}", accepted)

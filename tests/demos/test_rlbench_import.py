@@ -2,6 +2,7 @@ import shutil
 
 import pytest
 
+from imop.cli import main
 from imop.demos.rlbench import read_episode
 from imop.demos.rlbench_import import import_rlbench
 from imop.demos.store import DemonstrationStore
@@ -113,3 +114,28 @@ def test_real_episodes_are_imported_once(rlbench_demos, tmp_path):
     source = rlbench_demos / "open_drawer" / "all_variations" / "episodes" / "episode4"
     results = [import_rlbench(source, tmp_path / "store") for _ in range(2)]
     assert [(r.stored, r.there_already, r.findings) for r in results] == [(1, 0, ()), (0, 1, ())]
+
+
+@pytest.mark.parametrize(
+    ("asked", "code", "said"),
+    [
+        ((), 0, "3 demonstrations imported"),
+        (("--cameras", "wrist,front"), 0, "3 demonstrations imported"),
+        (
+            ("--cameras", "front,overhead"),
+            1,
+            "no images of camera overhead; remedy: ask for cameras that were",
+        ),
+        (("--cameras", "back"), 2, "cameras"),
+    ],
+)
+def test_command_takes_cameras(three, tmp_path, capsys, asked, code, said):
+    out = tmp_path / "store"
+    with pytest.raises(SystemExit) as ended:
+        main(["import", "rlbench", str(three), str(out), *asked])
+    told = capsys.readouterr()
+    assert ended.value.code == code
+    assert said in " ".join((told.out + told.err).split())
+    if code == 0:
+        views = DemonstrationStore.open(out)[0].final.views
+        assert list(views) == (asked[1].split(",") if asked else list(SYNTHETIC_CAMERAS))

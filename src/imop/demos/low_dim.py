@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from imop.demos import unpickle
 from imop.errors import CorruptData, InvalidInput
 from imop.geometry.se3 import from_pose7
-from imop.types import FloatArray, as_finite, as_pose
+from imop.types import FloatArray, as_finite, as_pose, rotation_error
 
 LOW_DIM = "low_dim_obs.pkl"
 
@@ -84,8 +84,7 @@ class Frame:
     def rigid(self, name: str) -> FloatArray:
         """A (4, 4) field with the nearest rotation: rounding is mended, anything worse refused."""
         T = self.numbers(name, (4, 4)).copy()
-        error = np.abs(T[:3, :3] @ T[:3, :3].T - np.eye(3)).max()
-        if 1e-12 < error < 1e-3 and np.linalg.det(T[:3, :3]) > 0:
+        if 1e-12 < rotation_error(T[:3, :3]) < 1e-3 and np.linalg.det(T[:3, :3]) > 0:
             T[:3, :3] = Rotation.from_matrix(T[:3, :3]).as_matrix()
         try:
             return as_pose(name, T)

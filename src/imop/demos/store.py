@@ -16,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 import zarr
 from numpy.typing import NDArray
-from zarr.codecs import BloscCodec
+from zarr.codecs import BloscCodec, Crc32cCodec
 
 from imop.demos import episode
 from imop.errors import CorruptData, InvalidInput
@@ -25,7 +25,7 @@ from imop.types import Demonstration
 FORMAT = "imop demonstrations"
 VERSION = 2
 READABLE = (1, 2)
-"""Version 2 demands the digest of an episode's attributes; in version 1 it may be missing."""
+"""Version 2 has checksums of attributes and of compressed data, which version 1 may lack."""
 
 _EPISODE = re.compile(r"episode_(\d{6,})$")
 _UNFINISHED = re.compile(r"\.writing-(?P<host>.+)-(?P<pid>\d+)-[0-9a-f]+$")
@@ -218,7 +218,8 @@ def _write(folder: Path, attributes: episode.Attributes, arrays: episode.Arrays)
             chunks=(1, *array.shape[1:]) if is_image else array.shape,
             shards=array.shape if is_image else None,
             chunk_key_encoding={"name": "default", "separator": "."},
-            compressors=BloscCodec(cname="zstd", clevel=5, shuffle="shuffle"),
+            # Blosc crashes on some damaged input, so that what it gets has a checksum.
+            compressors=[BloscCodec(cname="zstd", clevel=5, shuffle="shuffle"), Crc32cCodec()],
         )
     for file in folder.rglob("*"):
         if file.is_file():
