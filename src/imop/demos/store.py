@@ -214,8 +214,8 @@ def _write(folder: Path, attributes: episode.Attributes, arrays: episode.Arrays)
         group.create_array(
             name,
             data=array,
-            # One image can be read without the others, and yet they are one file.
-            chunks=(1, *array.shape[1:]) if is_image else array.shape,
+            # One image can be read without the others, and yet they are one file. No chunk may be empty.
+            chunks=(1, *array.shape[1:]) if is_image else tuple(max(side, 1) for side in array.shape),
             shards=array.shape if is_image else None,
             chunk_key_encoding={"name": "default", "separator": "."},
             # Blosc crashes on some damaged input, so that what it gets has a checksum.
