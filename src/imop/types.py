@@ -70,7 +70,7 @@ def _check_integers(name: str, given: NDArray[Any], limits: np.iinfo[Any]) -> No
 
 
 def rotation_error(R: FloatArray) -> float:
-    """How far (3, 3) is from orthonormal: the largest error in R R^T, infinite if R is absurd."""
+    """Largest error of an element of R R^T, R (3, 3); infinite if R is absurd."""
     return float(np.abs(R @ R.T - np.eye(3)).max()) if np.abs(R).max() < 1e3 else np.inf
 
 

@@ -136,6 +136,7 @@ def test_command_takes_cameras(three, tmp_path, capsys, asked, code, said):
     told = capsys.readouterr()
     assert ended.value.code == code
     assert said in " ".join((told.out + told.err).split())
+    assert out.exists() == (code != 2)
     if code == 0:
         views = DemonstrationStore.open(out)[0].final.views
         assert list(views) == (asked[1].split(",") if asked else list(SYNTHETIC_CAMERAS))

@@ -38,7 +38,7 @@ def route(seed=0, steps=3):
 
 @pytest.fixture(scope="module")
 def made():
-    return list(synthetic_routes(2, 8, TRAINING))
+    return list(synthetic_routes(2, 16, TRAINING))
 
 
 def test_every_state_but_the_last_is_asked_about(made):

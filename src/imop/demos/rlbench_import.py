@@ -8,7 +8,7 @@ from imop.demos.check_rlbench import check_episode
 from imop.demos.check_steps import TipPose
 from imop.demos.episode import digest_of
 from imop.demos.findings import Finding
-from imop.demos.rlbench import episodes, read_episode
+from imop.demos.rlbench import check_names, episodes, read_episode
 from imop.demos.store import DemonstrationStore
 from imop.errors import CorruptData, InvalidInput
 
@@ -51,10 +51,12 @@ def import_rlbench(
         track: wraps the sequence of episode folders, to show progress.
 
     Raises:
-        InvalidInput: if `out` exists and is not a store, cannot be written to, or there is no episode below
-            `source`; says how many were stored.
+        InvalidInput: if `out` exists and is not a store, there is no episode below `source`, or `cameras` has
+            unknown names; if `out` cannot be written to, which says how many were stored.
         CorruptData: if `out` is a damaged store.
     """
+    if cameras is not None:
+        check_names(cameras)
     folders = episodes(source)
     exists = Path(out).is_dir() and any(Path(out).iterdir())
     store = DemonstrationStore.open(out) if exists else DemonstrationStore.create(out)
