@@ -57,3 +57,9 @@ def test_a_folder_without_models_is_no_source(tmp_path):
     for path in (tmp_path, tmp_path / "none"):
         with pytest.raises(InvalidInput, match="RLBench"):
             assets.install(path, ["lamp_on"])
+
+
+def test_a_pointer_of_git_lfs_is_named_and_not_installed(tmp_path):
+    (tmp_path / "fridge.ttm").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n")
+    done = assets.install(tmp_path)
+    assert "git lfs pull" in done["fridge"].error and not assets.available("fridge")

@@ -8,7 +8,7 @@ import hashlib
 from pathlib import Path
 
 from imop.errors import ModelFormatError
-from imop.files import replaced, user_cache
+from imop.files import read, replaced, user_cache
 from imop.tasks.coppelia.container import unpack
 from imop.tasks.coppelia.model import Model
 from imop.tasks.coppelia.reader import read_body
@@ -23,9 +23,9 @@ def load_model(path: Path, folder: Path | None = None) -> Model:
 
     Raises:
         ModelFormatError: if it is not a readable model.
-        OSError: if there is no such file.
+        CorruptData: if there is no such file, or git LFS left a pointer in its place.
     """
-    data = path.read_bytes()
+    data = read(path, "copy it again")
     digest = hashlib.sha256(data).hexdigest()
     return _load(digest, data, folder or user_cache() / "models")
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from imop.errors import AssetMissing, InvalidInput, MissingExtra, ModelFormatError
+from imop.errors import AssetMissing, CorruptData, InvalidInput, MissingExtra, ModelFormatError
 from imop.files import replaced, user_cache
 from imop.tasks.coppelia.cache import load_model
 from imop.tasks.coppelia.lacks import lacks
@@ -34,7 +34,7 @@ def load(file: str) -> Model:
 
     Raises:
         AssetMissing: if it was not installed.
-        ModelFormatError: if the installed file is broken.
+        CorruptData, ModelFormatError: if the installed file is broken.
     """
     path = folder() / f"{file}.ttm"
     if not path.is_file():
@@ -92,7 +92,7 @@ def install(source: Path, known: Collection[str] = ()) -> dict[str, Installed]:
     for file, path in find(source).items():
         try:
             model = load_model(path)
-        except ModelFormatError as error:
+        except (CorruptData, ModelFormatError) as error:
             done[file] = Installed(error=str(error))
             continue
         with replaced(folder() / f"{file}.ttm") as temporary:
