@@ -268,6 +268,7 @@ def predict(
     demo_episode: int = 0,
     query_episode: int = 0,
     base: tuple[float, float, float] | None = None,
+    robot: str = "panda",
     method: str = "learned",
     weights: Path | None = None,
     out: Path = Path("runs/predict"),
@@ -284,6 +285,8 @@ def predict(
         query_episode: number of the episode to predict.
         base: where the robot's base is in the recordings' frame, metres; by default as in the simulation,
             with a table at a height of 0.752 m.
+        robot: whose points are left out and which poses are reached: panda, or one's own, such as
+            my_robot:MyArm.
         method: learned, replay, registration, textbook, or one's own, such as my_methods:MyPolicy.
         weights: folder that `imop train` wrote; by default the bundled weights.
         out: folder for the results.
@@ -297,7 +300,7 @@ def predict(
     shown, recorded = load_demonstration(demo, demo_episode), load_demonstration(query, query_episode)
     shown, recorded = moved(shown, T_imop_world), moved(recorded, T_imop_world)
     with _status(f"predicting {query}"):
-        predictions = predict_recorded(shown, recorded, method, out, weights, T_imop_world)
+        predictions = predict_recorded(shown, recorded, method, out, weights, T_imop_world, robot)
         try:
             draw_predictions(shown, recorded, predictions, out / "steps.png")
         except MissingExtra as error:

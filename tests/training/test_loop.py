@@ -186,7 +186,8 @@ def test_two_processes_train_as_one(shards, tmp_path):
     train(config(shards, tmp_path / "one", steps=1, mixed=False), CONFIG)
     (tmp_path / "worker.py").write_text(WORKER)
     root = Path(__file__).parents[2]
-    environment = {**os.environ, "PYTHONPATH": str(root), "OMP_NUM_THREADS": "1", "LT_ACCELERATOR": "cpu"}
+    paths = f"{root / 'src'}{os.pathsep}{root}"
+    environment = {**os.environ, "PYTHONPATH": paths, "OMP_NUM_THREADS": "1", "LT_ACCELERATOR": "cpu"}
     torchrun = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2"]
     command = [*torchrun, str(tmp_path / "worker.py"), str(shards), str(tmp_path / "two")]
     subprocess.run(command, env=environment, cwd=root, check=True, timeout=240)

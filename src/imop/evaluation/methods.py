@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Protocol, cast
 
 from imop import plugins
-from imop.errors import InvalidInput, MissingExtra
+from imop.errors import InvalidInput
 from imop.evaluation.oracle import OraclePolicy, Poses
+from imop.evaluation.robots import PANDA, robot_functions
 from imop.geometry.perception import Perception
 from imop.networks.model import BUNDLED
 from imop.policy.baselines import ReplayPolicy
@@ -15,8 +16,7 @@ from imop.policy.matcher import Matcher
 from imop.policy.one_shot import OneShotPolicy
 from imop.policy.registration import RegistrationMatcher
 from imop.policy.textbook import TextbookMatcher
-from imop.robots.panda import panda_self_filter
-from imop.types import Action, Demonstration, FloatArray, Observation
+from imop.types import Action, Demonstration, Observation
 
 METHODS = ("replay", "textbook", "registration", "learned", "routed", "oracle", "expert")
 _OWN = (
@@ -39,7 +39,11 @@ class Policy(Protocol):
 
 
 def make_policy(
-    method: str, world: Poses | None = None, min_confidence: float = 0.0, weights: Path | None = None
+    method: str,
+    world: Poses | None = None,
+    min_confidence: float = 0.0,
+    weights: Path | None = None,
+    robot: str = PANDA,
 ) -> Policy:
     """A fresh policy by the name of its method.
 
@@ -50,14 +54,16 @@ def make_policy(
         world: the simulated world, which only the oracle reads.
         min_confidence: of the one-shot policies.
         weights: folder of the learned policy's weights; by default the bundled ones.
+        robot: name of the robot, see `robot_functions`; one's own method deals with it itself.
 
     Raises:
-        InvalidInput: for an unknown method, what makes no policy, or an oracle without a world.
+        InvalidInput: for an unknown method or robot, what makes no policy, or an oracle without a world.
         MissingExtra: for textbook without Open3D.
     """
     if method == "replay":
         return ReplayPolicy()
-    perception, reachable = Perception(panda_self_filter().is_robot), _reachable()
+    is_robot, reachable = robot_functions(robot)
+    perception = Perception(is_robot)
     if method in ("registration", "textbook"):
         matcher: Matcher = RegistrationMatcher() if method == "registration" else TextbookMatcher()
         return OneShotPolicy(matcher, perception, min_confidence=min_confidence, feasible=reachable)
@@ -90,12 +96,3 @@ def find_method(name: str) -> Callable[[], object]:
         raise InvalidInput("method", f"{name} needs arguments", _OWN)
     made: Callable[[], object] = factory
     return made
-
-
-def _reachable() -> Callable[[FloatArray], bool] | None:
-    """Whether the Panda reaches a pose; None without its inverse kinematics, then no pose is ruled out."""
-    try:
-        from imop.sim.kinematics import reachable
-    except MissingExtra:
-        return None
-    return reachable

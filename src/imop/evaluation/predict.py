@@ -9,6 +9,7 @@ from rich.table import Table
 
 from imop.evaluation.methods import Policy, make_policy
 from imop.evaluation.report import save_json
+from imop.evaluation.robots import PANDA
 from imop.geometry import se3
 from imop.geometry.accuracy import FINE
 from imop.robots.panda import T_WORLD_BASE
@@ -70,6 +71,7 @@ def predict_recorded(
     out: Path,
     weights: Path | None = None,
     T_imop_world: FloatArray | None = None,
+    robot: str = PANDA,
 ) -> list[Prediction]:
     """Predict every keyframe of `recorded` and write result.json into `out`.
 
@@ -81,12 +83,13 @@ def predict_recorded(
         weights: folder of the learned policy's weights; by default the bundled ones.
         T_imop_world: (4, 4) by which both were moved before (see `frame_of`); poses are written as they were
             recorded.
+        robot: its name, see `robot_functions`.
 
     Raises:
         ImopError: if either recording cannot be used.
     """
     T_world_imop = np.eye(4) if T_imop_world is None else se3.invert(T_imop_world)
-    policy = make_policy(method, weights=weights)
+    policy = make_policy(method, weights=weights, robot=robot)
     policy.watch(demonstration.stripped())
     predictions = predict(policy, recorded)
     steps = [

@@ -1,0 +1,70 @@
+"""What a policy needs to know of a robot: its own points, and which poses it reaches."""
+
+import inspect
+from collections.abc import Callable
+from typing import Protocol, cast
+
+from imop import plugins
+from imop.errors import InvalidInput, MissingExtra
+from imop.geometry import se3
+from imop.geometry.perception import RobotMask
+from imop.robots.panda import T_WORLD_BASE, panda_self_filter
+from imop.types import BoolArray, FloatArray
+
+PANDA = "panda"
+_OWN = (
+    "a class or function that makes, called without arguments, an object with is_robot and reachable, named "
+    "module:object or by an entry point imop.robots"
+)
+
+Reachable = Callable[[FloatArray], bool]
+
+
+class Robot(Protocol):
+    """A robot of one's own, in the frame of its base."""
+
+    def is_robot(self, p_base: FloatArray, joint_positions: FloatArray, gripper_opening: float) -> BoolArray:
+        """(N,) which points (N, 3) are the robot's; joint positions as recorded, opening 0 .. 1."""
+
+    def reachable(self, T_base_gripper: FloatArray) -> bool:
+        """Whether the gripper can be taken to a pose (4, 4)."""
+
+
+def robot_functions(name: str = PANDA) -> tuple[RobotMask, Reachable | None]:
+    """The self-filter and the reachability of a robot, in imop's world frame.
+
+    Args:
+        name: panda, "module:object", or an entry point of the group imop.robots.
+
+    Returns:
+        Reachability is None for the Panda without the extra sim: then no pose is ruled out.
+
+    Raises:
+        InvalidInput: if there is no such robot, or it is none.
+    """
+    if name == PANDA:
+        return panda_self_filter().is_robot, _panda_reachable()
+    robot, T_base_world = _own(name), se3.invert(T_WORLD_BASE)
+
+    def is_robot(p_world: FloatArray, joint_positions: FloatArray, gripper_opening: float) -> BoolArray:
+        return robot.is_robot(se3.apply(T_base_world, p_world), joint_positions, gripper_opening)
+
+    return is_robot, lambda T_world_gripper: robot.reachable(T_base_world @ T_world_gripper)
+
+
+def _own(name: str) -> Robot:
+    factory = plugins.find("robot", name, "imop.robots")
+    if not (inspect.isclass(factory) or inspect.isfunction(factory)) or not plugins.takes_nothing(factory):
+        raise InvalidInput("robot", name, f"{PANDA}, or {_OWN}")
+    robot = factory()
+    if not all(callable(getattr(robot, part, None)) for part in ("is_robot", "reachable")):
+        raise InvalidInput("robot", f"{name} makes a {type(robot).__name__}", _OWN)
+    return cast(Robot, robot)
+
+
+def _panda_reachable() -> Reachable | None:
+    try:
+        from imop.sim.kinematics import reachable
+    except MissingExtra:
+        return None
+    return reachable
