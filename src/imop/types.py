@@ -58,7 +58,7 @@ def as_finite(name: str, value: Any, shape: tuple[int | None, ...]) -> FloatArra
     return array
 
 
-def _check_integers(name: str, given: NDArray[Any], limits: np.iinfo[Any]) -> None:
+def _check_integers(name: str, given: NDArray[Any], limits: "np.iinfo[Any]") -> None:
     """A conversion would turn colours from 0 to 1 into black, and 256 into 0, without a word."""
     if not given.size or given.dtype == limits.dtype:
         return
