@@ -2,12 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from imop.geometry import se3
+from imop.sim.cameras import Camera
 from imop.sim.robot import PANDA_HOME_Q
 from imop.training import steps
+from imop.training.families.redraw import redrawn
 from imop.training.families.thing import Family, Thing
 from imop.training.stage import Stage, State, Unreachable, above_table
 from imop.training.steps import Recipe
@@ -38,30 +41,72 @@ class Scene:
     families: tuple[str, ...] = ()
 
 
+class Draw(NamedTuple):
+    """How a thing was drawn: equal draws are indistinguishable things.
+
+    Attributes:
+        family: its name.
+        shape, color: seeds.
+        sizes: seed of other sizes for that shape, or None.
+    """
+
+    family: str
+    shape: int
+    color: int
+    sizes: int | None = None
+
+    def thing(self, families: Mapping[str, Family]) -> Thing:
+        """Draw it again.
+
+        Raises:
+            Diverged: if the shape has no other sizes.
+        """
+        family = families[self.family]
+        if self.sizes is None:
+            return family(np.random.default_rng(self.shape), np.random.default_rng(self.color))
+        return redrawn(family, self.shape, self.color, self.sizes)
+
+
+Part = tuple[str, int, int, int]
+"""What is done, with which things; -1 for none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What a scene is made of, before it is compiled.
+
+    Attributes:
+        draws: of all things; those that something is done with come first.
+        things: the same, drawn.
+        parts: what is done.
+    """
+
+    draws: tuple[Draw, ...]
+    things: tuple[Thing, ...]
+    parts: tuple[Part, ...]
+
+    @property
+    def acting(self) -> int:
+        """The number of things that something is done with."""
+        return 1 + max(number for part in self.parts for number in part[1:])
+
+
 class _Cast:
     """Draws things and remembers how, so that they can be drawn again in another shape or colour."""
 
     def __init__(self, families: Mapping[str, Family], rng: np.random.Generator):
         self.families, self.rng = families, rng
         self.things: list[Thing] = []
-        self.kinds: list[int] = []
-        self._seeds: list[tuple[str, int, int]] = []
+        self.draws: list[Draw] = []
 
     def add(self, name: str | None = None, shape: int | None = None, color: int | None = None) -> int:
         """Add one of a family; what is not given is random. Returns its number."""
         name = str(self.rng.choice(list(self.families))) if name is None else name
         drawn = self.rng.integers(2**32, size=2).tolist()
-        seeds = (name, drawn[0] if shape is None else shape, drawn[1] if color is None else color)
-        thing = self.families[name](np.random.default_rng(seeds[1]), np.random.default_rng(seeds[2]))
-        self.kinds.append(self._seeds.index(seeds) if seeds in self._seeds else len(self._seeds))
-        self.things.append(thing)
-        self._seeds.append(seeds)
+        draw = Draw(name, drawn[0] if shape is None else shape, drawn[1] if color is None else color)
+        self.things.append(draw.thing(self.families))
+        self.draws.append(draw)
         return len(self.things) - 1
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Their families."""
-        return tuple(name for name, _, _ in self._seeds)
 
     def where(self, wanted: str) -> int:
         """Add a random thing that has some of the attribute `wanted`."""
@@ -70,13 +115,13 @@ class _Cast:
             offered = getattr(self.things[number], wanted)
             if offered is not None and len(offered):
                 return number
-            for items in (self.things, self.kinds, self._seeds):
-                items.pop()
+            self.things.pop()
+            self.draws.pop()
         raise Unreachable(f"no family has {wanted}")
 
     def distract(self, number: int) -> None:
         """Add things that resemble one."""
-        name, shape, color = self._seeds[number]
+        name, shape, color, _ = self.draws[number]
         if self.rng.random() < 0.4:
             self.add(name, shape=shape)
         if self.rng.random() < 0.25:
@@ -85,16 +130,16 @@ class _Cast:
             self.add(name, shape, color)
 
 
-def draw_scene(
+def draw_plan(
     families: Mapping[str, Family], rng: np.random.Generator, parts_odds: tuple[float, ...] = (0.65, 0.35)
-) -> Scene:
-    """A scene with one thing to do, or two, or as many as `parts_odds` has chances for.
+) -> Plan:
+    """Things, and one thing to do, or two, or as many as `parts_odds` has chances for.
 
     Raises:
         Unreachable: if no family can play a part that was drawn.
     """
     cast = _Cast(families, rng)
-    parts: list[tuple[str, int, int, int]] = []
+    parts: list[Part] = []
     for _ in range(int(rng.choice(1 + np.arange(len(parts_odds)), p=parts_odds))):
         kind = str(rng.choice(("carry", "use", "operate", "press", "push"), p=(0.45, 0.12, 0.27, 0.06, 0.1)))
         if kind == "carry":
@@ -111,17 +156,35 @@ def draw_scene(
         cast.distract(number)
     for _ in range(int(rng.integers(1, 4))):
         cast.add()
-    for items in (cast.things, cast.kinds):
+    for items in (cast.things, cast.draws):
         del items[max(MOST_THINGS, acting) :]
-    stage = Stage(cast.things, placed_cameras(rng.spawn(1)[0]))
-    recipes = [_recipe(stage, part, rng) for part in parts]
+    return Plan(tuple(cast.draws), tuple(cast.things), tuple(parts))
+
+
+def build(plan: Plan, cameras: Mapping[str, Camera], rng: np.random.Generator) -> Scene:
+    """Compile a plan; how exactly things are done is drawn from `rng`."""
+    stage = Stage(plan.things, cameras)
+    recipes = [_recipe(stage, part, rng) for part in plan.parts]
     recipe = recipes[0]
     for other in recipes[1:]:
         recipe = recipe.then(other)
-    return Scene(stage, tuple(cast.kinds), recipe, cast.names[: len(cast.things)])
+    kinds = tuple(plan.draws.index(draw) for draw in plan.draws)
+    return Scene(stage, kinds, recipe, tuple(draw.family for draw in plan.draws))
 
 
-def _recipe(stage: Stage, part: tuple[str, int, int, int], rng: np.random.Generator) -> Recipe:
+def draw_scene(
+    families: Mapping[str, Family], rng: np.random.Generator, parts_odds: tuple[float, ...] = (0.65, 0.35)
+) -> Scene:
+    """A scene of what `draw_plan` draws.
+
+    Raises:
+        Unreachable: if no family can play a part that was drawn.
+    """
+    plan = draw_plan(families, rng, parts_odds)
+    return build(plan, placed_cameras(rng.spawn(1)[0]), rng)
+
+
+def _recipe(stage: Stage, part: Part, rng: np.random.Generator) -> Recipe:
     kind, first, second, below = part
     if kind == "carry":
         return steps.carry(stage, first, second, rng, None if below < 0 else below)
