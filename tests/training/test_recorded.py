@@ -8,7 +8,8 @@ from imop.demos.store import DemonstrationStore
 from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.geometry.neighbours import nearest
-from imop.training.recorded import group_pairs, groups, take, write_recorded
+from imop.training.recorded import groups, write_recorded
+from imop.training.recorded_takes import group_pairs, take
 from imop.training.shards import Shard
 from imop.types import Action, Demonstration, Keyframe
 from tests.demos.scenes import Box, joints_for, observe

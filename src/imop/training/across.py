@@ -1,27 +1,22 @@
 """Pairs of a step on one thing and the same step on another of its kind."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from imop.geometry import se3
 from imop.training.families.thing import Family
 from imop.training.instances import Variation, other_instances
+from imop.training.invariance import distances, has_invariant_part
 from imop.training.pairs import StepPair
 from imop.training.plans import draw_plan
 from imop.training.scenes import Scene, build, demonstrate
 from imop.training.stage import Unreachable
-from imop.training.surfaces import invariance, surface
+from imop.training.surfaces import surface
 from imop.training.takes import Poses, Take, reference, rigid_with, seen_pair, take
 from imop.training.viewpoints import placed_cameras
 from imop.types import FloatArray
-
-INVARIANT = 0.01
-"""A step in which no part of the region stays this near to the action, metres, has no invariant region."""
-_PART = 0.05
-"""Share of the region that is a part."""
 
 
 @dataclass(eq=False)
@@ -37,10 +32,7 @@ class _Instance:
     scene: Scene
     take: Take
     again: tuple[Poses, ...]
-
-    @cached_property
-    def _surfaces(self) -> dict[int, dict[str, FloatArray]]:
-        return {}
+    _surfaces: dict[int, dict[str, FloatArray]] = field(default_factory=dict)
 
     def surface(self, thing: int, link: str) -> FloatArray:
         """(N, 3) points of the outside of a link, in its frame."""
@@ -102,17 +94,17 @@ def _pair(shown: _Instance, asked: _Instance, step: int, labelled: bool) -> Step
     if pair is None or not labelled:
         return pair
     label = _label(shown, asked, step, members)
-    known = label[pair.region & np.isfinite(label)]
-    return replace(pair, invariance=label) if len(known) and np.quantile(known, _PART) < INVARIANT else None
+    return replace(pair, invariance=label) if has_invariant_part(label) else None
 
 
 def _label(shown: _Instance, asked: _Instance, step: int, members: list[tuple[int, str]]) -> FloatArray:
     """(N,) `StepPair.invariance`."""
     cloud, now = shown.take.clouds[step], asked.take.poses[step]
+    assert cloud.ids is not None
     found = np.full(len(cloud), np.nan)
     for thing, link in members:
         mine = cloud.ids == shown.scene.stage.links[thing][link]
         others = se3.apply(now[thing, link], asked.surface(thing, link))
         if mine.any() and len(others):
-            found[mine] = invariance(cloud.points[mine], shown.goal(step), others, asked.goal(step))
+            found[mine] = distances(cloud.points[mine], shown.goal(step), others, asked.goal(step))
     return found

@@ -68,7 +68,7 @@ def _other(draw: Draw, variation: Variation, rng: np.random.Generator) -> Draw:
 
 
 def _confusing(draw: Draw, other: Mapping[Draw, Draw], variation: Variation) -> bool:
-    """Whether a thing is of the kind of one that changes, without being its equal or having another colour."""
+    """Whether a thing is of the kind of one that changes, not its equal, and of no colour that tells."""
     return draw not in other and any(
         draw.family == before.family and (variation != "shape" or draw.color == before.color)
         for before in other

@@ -1,10 +1,9 @@
-"""The surface of a thing, all around, and how far points of one thing are from where another has them."""
+"""The surface of a thing, all around."""
 
 import numpy as np
 
 from imop.geometry import se3
 from imop.geometry.cloud import fuse
-from imop.geometry.neighbours import nearest
 from imop.sim.cameras import Camera, look_at
 from imop.training.stage import Stage, State
 from imop.types import FloatArray
@@ -18,7 +17,7 @@ _OPENED = 0.12
 
 
 def surface(stage: Stage, thing: int) -> dict[str, FloatArray]:
-    """Link -> points (N, 3) of its outside in its own frame, seen with all joints at both ends of their way."""
+    """Link -> points (N, 3) of its outside in its own frame, as seen with all joints at either end."""
     ends: tuple[dict[tuple[int, str], float], ...] = ({}, {})
     for moving in stage.things[thing].moving:
         for joints, position in zip(ends, sorted(moving.positions), strict=True):
@@ -51,18 +50,3 @@ def _around(radius: float) -> dict[str, Camera]:
     field = float(np.degrees(2 * np.arcsin(min(radius / _FAR, 0.9))))
     middle = (0.0, 0.0, float(_MIDDLE[2]))
     return {str(i): look_at((x, y, z), middle, field) for i, (x, y, z) in enumerate(eyes.tolist())}
-
-
-def invariance(
-    points: FloatArray, T_support_goal: FloatArray, others: FloatArray, T_query_goal: FloatArray
-) -> FloatArray:
-    """(N,) how far points are from the nearest of another thing's, both seen from the action, metres.
-
-    Args:
-        points: (N, 3) of the thing shown, world frame.
-        T_support_goal: (4, 4) the action on it, T_i.
-        others: (M, 3) of the other thing, world frame.
-        T_query_goal: (4, 4) the action on that one, T_j.
-    """
-    seen = se3.apply(se3.invert(T_support_goal), points)
-    return nearest(seen, se3.apply(se3.invert(T_query_goal), others))[0][:, 0]

@@ -5,9 +5,10 @@ from itertools import permutations
 
 import numpy as np
 
+from imop.errors import InvalidInput
 from imop.training.across import pairs_across
 from imop.training.families.thing import Family
-from imop.training.instances import Variation, shares
+from imop.training.instances import VARIATIONS, Variation, shares
 from imop.training.pairs import StepPair
 from imop.training.scenes import draw_scene
 from imop.training.stage import Unreachable
@@ -16,6 +17,8 @@ from imop.training.takes import make_pair, take
 TAKES = 2
 """How often a scene's recipe is demonstrated; every two takes make pairs. New scenes teach more than new
 takes of old ones."""
+_PATIENCE = 500
+"""So many scenes in a row may give no pair."""
 SAME_ONLY = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -24,6 +27,8 @@ def synthetic_pairs(
 ) -> Iterator[StepPair]:
     """`count` pairs, the same for the same seed, families and mix.
 
+    Those that show the same things twice are the first ones of `SAME_ONLY`, whatever the mix.
+
     Args:
         seed: of everything that is drawn.
         count: how many.
@@ -31,29 +36,30 @@ def synthetic_pairs(
         mix: shares of pairs that show the same things, other colours, other shapes, and both.
 
     Raises:
-        InvalidInput: if the mix is not four shares.
+        InvalidInput: if the mix is not four shares, or the families cannot give a pair of it.
     """
     wanted = shares(mix)
-    rng = np.random.default_rng(seed)
+    streams = {variation: _pairs(families, variation, seed) for variation in wanted}
     made = dict.fromkeys(wanted, 0)
-    while True:
-        # What lags most behind its share comes next.
-        total = sum(made.values())
-        variation = max(wanted, key=lambda name: wanted[name] * (total + 1) - made[name])
-        for pair in _scene_pairs(families, variation, rng):
-            if sum(made.values()) == count:
-                return
-            made[variation] += 1
-            yield pair
+    for number in range(1, count + 1):
+        due = max(wanted, key=lambda variation: wanted[variation] * number - made[variation])
+        made[due] += 1
+        yield next(streams[due])
 
 
-def _scene_pairs(
-    families: Mapping[str, Family], variation: Variation, rng: np.random.Generator
-) -> list[StepPair]:
-    try:
-        return _same(families, rng) if variation == "same" else pairs_across(families, variation, rng)
-    except Unreachable:
-        return []
+def _pairs(families: Mapping[str, Family], variation: Variation, seed: int) -> Iterator[StepPair]:
+    """Pairs of one variation without end."""
+    number = VARIATIONS.index(variation)
+    rng = np.random.default_rng((seed, number) if number else seed)
+    fruitless = 0
+    while fruitless < _PATIENCE:
+        try:
+            made = _same(families, rng) if variation == "same" else pairs_across(families, variation, rng)
+        except Unreachable:
+            made = []
+        yield from made
+        fruitless = 0 if made else fruitless + 1
+    raise InvalidInput("mix", f"no pair of {variation} in {_PATIENCE} scenes", "more families, or less of it")
 
 
 def _same(families: Mapping[str, Family], rng: np.random.Generator) -> list[StepPair]:

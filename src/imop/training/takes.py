@@ -64,7 +64,8 @@ def seen_pair(
     """The pair of a step; None if one of the takes does not see enough of what matters.
 
     Args:
-        shown, asked: the demonstration, and the execution that the query is of.
+        shown: the demonstration.
+        asked: the execution that the query is of.
         step: its number.
         members: the links of the region.
         before: where the links of the *query's* things would be for the action of the demonstration.

@@ -1,7 +1,8 @@
 """Another thing of the same kind: the decisions of a family are kept, the sizes are drawn anew.
 
 A family decides (`integers`, `choice`, `random`, ...) what its thing is made of, and draws sizes. Sizes and
-proportions are positive; a range that holds zero or less is of an angle or a place along something, and stays.
+proportions are positive. A range that holds zero or less is of an angle, or of a place along something; what
+was drawn from it stays.
 """
 
 from collections.abc import Callable
@@ -24,6 +25,7 @@ _TURNED = np.radians(20)
 class Diverged(ImopError):
     """With other sizes the family decides otherwise: the thing has another structure."""
 
+
 _OTHER = 0.004
 """Metres by which another thing is another."""
 
@@ -33,20 +35,21 @@ def redrawn(family: Family, shape: int, color: int, sizes: int) -> Thing:
 
     Args:
         family: draws the thing.
-        shape, color: seeds of the first thing.
+        shape: seed of the first thing.
+        color: seed of the colours of both.
         sizes: seed of the new sizes.
 
     Raises:
         Diverged: if no thing with the same structure was found.
     """
     recorder = _Recorder(shape)
-    first = family(recorder.generator, np.random.default_rng(color))
+    first = family(cast(np.random.Generator, recorder), np.random.default_rng(color))
     for number, seed in enumerate(np.random.SeedSequence(sizes).generate_state(_TRIES).tolist()):
         # A family that draws until its thing is sound repeats what failed only with the sizes that failed.
         kept = number * len(recorder.draws) // _TRIES
         replay = _Replay(recorder.draws, kept, seed)
         try:
-            other = family(replay.generator, np.random.default_rng(color))
+            other = family(cast(np.random.Generator, replay), np.random.default_rng(color))
         except Diverged:
             continue
         if replay.finished and alike(first, other) and differ(first, other):
@@ -60,11 +63,6 @@ class _Recorder:
     def __init__(self, seed: int):
         self._rng = np.random.default_rng(seed)
         self.draws: list[tuple[str, tuple[Any, ...], Any]] = []
-
-    @property
-    def generator(self) -> np.random.Generator:
-        """Itself, as what a family takes it for."""
-        return cast(np.random.Generator, self)
 
     def __getattr__(self, method: str) -> Callable[..., Any]:
         def draw(*args: Any, **options: Any) -> Any:
@@ -81,8 +79,6 @@ class _Replay:
     def __init__(self, draws: list[tuple[str, tuple[Any, ...], Any]], kept: int, seed: int):
         self._draws, self._kept, self._next = draws, kept, 0
         self._rng = np.random.default_rng(seed)
-
-    generator = _Recorder.generator
 
     @property
     def finished(self) -> bool:
@@ -110,7 +106,7 @@ class _Replay:
 
 
 def alike(one: Thing, other: Thing) -> bool:
-    """Whether two things have the same structure: the same parts on the same joints, held from the same sides."""
+    """Whether two things have the same structure: equal parts on equal joints, held from the same sides."""
     if _outline(one) != _outline(other):
         return False
     pairs = zip((*_frames(one), *one.rests), (*_frames(other), *other.rests), strict=True)
