@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from imop.geometry import se3
+from imop.geometry.neighbours import nearest
 from imop.training.families.thing import Family
 from imop.training.instances import Variation, other_instances
 from imop.training.invariance import distances, has_invariant_part
@@ -17,6 +18,9 @@ from imop.training.surfaces import surface
 from imop.training.takes import Poses, Take, reference, rigid_with, seen_pair, take
 from imop.training.viewpoints import placed_cameras
 from imop.types import FloatArray
+
+_BESIDE = 0.01
+"""What is measured this far from the thing's surface is noise, metres."""
 
 
 @dataclass(eq=False)
@@ -98,13 +102,16 @@ def _pair(shown: _Instance, asked: _Instance, step: int, labelled: bool) -> Step
 
 
 def _label(shown: _Instance, asked: _Instance, step: int, members: list[tuple[int, str]]) -> FloatArray:
-    """(N,) `StepPair.invariance`."""
-    cloud, now = shown.take.clouds[step], asked.take.poses[step]
+    """(N,) `StepPair.invariance`, from where the points are on the thing itself; noise beside it has none."""
+    cloud, before, now = shown.take.clouds[step], shown.take.poses[step], asked.take.poses[step]
     assert cloud.ids is not None
     found = np.full(len(cloud), np.nan)
     for thing, link in members:
-        mine = cloud.ids == shown.scene.stage.links[thing][link]
+        mine = np.flatnonzero(cloud.ids == shown.scene.stage.links[thing][link])
+        own = se3.apply(before[thing, link], shown.surface(thing, link))
         others = se3.apply(now[thing, link], asked.surface(thing, link))
-        if mine.any() and len(others):
-            found[mine] = distances(cloud.points[mine], shown.goal(step), others, asked.goal(step))
+        if len(mine) and len(own) and len(others):
+            off, index = nearest(cloud.points[mine], own)
+            label = distances(own[index[:, 0]], shown.goal(step), others, asked.goal(step))
+            found[mine] = np.where(off[:, 0] < _BESIDE, label, np.nan)
     return found
