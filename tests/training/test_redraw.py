@@ -24,7 +24,7 @@ def test_every_family_has_another_thing_of_the_same_structure(name):
     np.testing.assert_array_equal(*colors)
     for a, b in zip(first.holds, other.holds, strict=True):
         assert a.link == b.link
-        assert se3.rotation_distance(a.T_link_gripper, b.T_link_gripper) < np.radians(20)
+        assert se3.rotation_distance(a.T_link_gripper, b.T_link_gripper) < np.radians(10)
 
 
 def test_other_colours_do_not_change_the_sizes():

@@ -61,16 +61,16 @@ def pairs_across(
     Raises:
         Unreachable: if what was drawn cannot be done, or has no other things.
     """
-    plans = other_instances(draw_plan(families, rng), families, variation, rng)
+    *plans, changed = other_instances(draw_plan(families, rng), families, variation, rng)
     cameras, how = placed_cameras(rng.spawn(1)[0]), int(rng.integers(2**32))
-    scenes = [build(plan, cameras, np.random.default_rng(how)) for plan in plans[:2]]
+    scenes = [build(plan, cameras, np.random.default_rng(how)) for plan in plans]
     if _outline(scenes[0]) != _outline(scenes[1]):
         raise Unreachable("it is done otherwise with the other things")
     one, other = (_instance(scene, rng) for scene in scenes)
     found = []
     for step in range(len(scenes[0].recipe.steps)):
         concerned = {scenes[0].recipe.steps[step].thing, one.take.states[step].held}
-        if concerned & plans[2]:
+        if concerned & changed:
             found += [_pair(a, b, step, variation != "color") for a, b in ((one, other), (other, one))]
     return [pair for pair in found if pair is not None]
 

@@ -18,16 +18,16 @@ from imop.training.families.thing import Family, Moving, Thing
 from imop.types import FloatArray
 
 _TRIES = 20
-_TURNED = np.radians(20)
+_TURNED = np.radians(10)
 """Things of one structure have their frames and axes turned by less than this."""
+_OTHER = 0.004
+"""Metres by which another thing is another."""
+_Draw = tuple[str, tuple[Any, ...], Any]
+"""Method, arguments, value."""
 
 
 class Diverged(ImopError):
     """With other sizes the family decides otherwise: the thing has another structure."""
-
-
-_OTHER = 0.004
-"""Metres by which another thing is another."""
 
 
 def redrawn(family: Family, shape: int, color: int, sizes: int) -> Thing:
@@ -58,11 +58,11 @@ def redrawn(family: Family, shape: int, color: int, sizes: int) -> Thing:
 
 
 class _Recorder:
-    """Draws as numpy's default generator does and remembers every draw: method, arguments, value."""
+    """Draws as numpy's default generator does and remembers every draw."""
 
     def __init__(self, seed: int):
         self._rng = np.random.default_rng(seed)
-        self.draws: list[tuple[str, tuple[Any, ...], Any]] = []
+        self.draws: list[_Draw] = []
 
     def __getattr__(self, method: str) -> Callable[..., Any]:
         def draw(*args: Any, **options: Any) -> Any:
@@ -76,7 +76,7 @@ class _Recorder:
 class _Replay:
     """Gives recorded draws again, but draws sizes anew after the first `kept` draws."""
 
-    def __init__(self, draws: list[tuple[str, tuple[Any, ...], Any]], kept: int, seed: int):
+    def __init__(self, draws: list[_Draw], kept: int, seed: int):
         self._draws, self._kept, self._next = draws, kept, 0
         self._rng = np.random.default_rng(seed)
 
