@@ -43,7 +43,7 @@ from imop.training.families.thing import revolution
 from imop.training.pairs import StepPair
 from imop.training.scenes import Scene, demonstrate, draw_scene
 from imop.training.stage import Unreachable
-from imop.training.synthetic import Take, is_round, make_pair
+from imop.training.takes import Take, is_round, make_pair
 from imop.types import Action, FloatArray, Observation
 
 

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -81,3 +83,12 @@ def test_colours_stay_colours_and_the_region_is_never_lost():
         assert changed.region.any() and len(changed.region) == len(changed.support)
         for cloud in (changed.support, changed.after, changed.query):
             assert cloud.colors.min() >= 0 and cloud.colors.max() <= 1
+
+
+def test_labels_stay_with_their_points():
+    before = pair()
+    label = np.where(before.region, 1e-5 * np.arange(len(before.region)), np.nan)
+    changed = augment(replace(before, invariance=label), np.random.default_rng(0))
+    np.testing.assert_array_equal(np.isfinite(changed.invariance), changed.region)
+    kept = changed.invariance[changed.region]
+    assert np.isin(kept, label).all() and (np.diff(kept) > 0).all() and len(kept) < before.region.sum()

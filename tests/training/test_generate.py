@@ -21,6 +21,15 @@ def test_a_family_of_the_other_set_is_refused_and_the_accepted_ones_named(tmp_pa
     assert not (tmp_path / "out").exists()
 
 
+def test_a_mix_gives_labelled_pairs_and_a_wrong_one_is_refused_before_anything_is_made(tmp_path):
+    generate(tmp_path / "mixed", 2, seed=0, jobs=1, names=("block", "tray"), mix=(1, 0, 1, 0))
+    shard = Shard(tmp_path / "mixed" / "shard-00000.npz")
+    assert sorted(shard[i].invariance is None for i in range(2)) == [False, True]
+    with pytest.raises(InvalidInput, match="mix"):
+        generate(tmp_path / "none", 2, seed=0, jobs=1, mix=(0, 0, 0, 0))
+    assert not (tmp_path / "none").exists()
+
+
 def test_naming_all_families_changes_nothing(tmp_path):
     for out, names in (("all", ()), ("named", tuple(reversed(TRAINING))), ("few", ("block", "drawers"))):
         generate(tmp_path / out, 1, seed=0, jobs=1, names=names)

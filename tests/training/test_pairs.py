@@ -58,6 +58,24 @@ def test_a_region_smaller_than_the_grid_keeps_a_point():
     assert len(sample(replace(pair(), region=tiny)).chosen) >= 1
 
 
+def test_equal_shapes_are_at_no_distance_from_each_other():
+    made = sample(pair())
+    inside = made.region > 0.5
+    assert (made.invariance[inside] == 0).all() and torch.isnan(made.invariance[~inside]).all()
+
+
+def test_what_has_no_counterpart_is_not_matched():
+    equal = pair()
+    left = equal.region & (equal.support.points[:, 0] < np.median(equal.support.points[equal.region, 0]))
+    label = np.where(left, 2 * MATCH_RADIUS, np.where(equal.region, 0.001, np.nan))
+    other = sample(replace(equal, invariance=label))
+    far = other.invariance[other.chosen[other.targets[0][:, 0]]] > MATCH_RADIUS
+    assert len(other.targets[0]) and not far.any()
+    assert 0 < len(other.targets[0]) < len(sample(equal).targets[0])
+    unknown = sample(replace(equal, invariance=np.full(len(label), np.nan)))
+    torch.testing.assert_close(unknown.targets[0], sample(equal).targets[0])
+
+
 def test_the_cap_on_region_points():
     assert len(sample(pair(), max_region=5).chosen) == 5
 
@@ -99,6 +117,7 @@ def test_the_losses_of_a_batch_train_both_networks():
     [
         ({"region": np.zeros(3, dtype=bool)}, "region"),
         ({"region": np.zeros(len(pair().support), dtype=bool)}, "region"),
+        ({"invariance": np.zeros(3)}, "invariance"),
         ({"T_query_support": np.zeros((0, 4, 4))}, "T_query_support"),
         ({"T_query_support": 2 * np.eye(4)[None]}, "T_query_support"),
         ({"T_world_goal": np.eye(3)}, "T_world_goal"),

@@ -8,7 +8,9 @@ from imop.demos.store import DemonstrationStore
 from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.geometry.neighbours import nearest
-from imop.training.recorded import group_pairs, groups, take, write_recorded
+from imop.training.recorded import groups, write_recorded
+from imop.training.recorded_across import other_pairs
+from imop.training.recorded_takes import group_pairs, take
 from imop.training.shards import Shard
 from imop.types import Action, Demonstration, Keyframe
 from tests.demos.scenes import Box, joints_for, observe
@@ -34,20 +36,20 @@ def at(place, half):
 
 
 @cache
-def demonstration(number, hidden=False):
+def demonstration(number, hidden=False, half=BLOCK, instance=3):
     """Go to the block, then over the plate; the gripper is shown at home all the time."""
-    block, plate = (at(p, half) for p, half in zip(PLACES[number], (BLOCK, PLATE), strict=True))
-    boxes = [Box(block, BLOCK, (200, 40, 40), 10), Box(plate, PLATE, (40, 60, 200), 12)]
+    block, plate = (at(p, size) for p, size in zip(PLACES[number], (half, PLATE), strict=True))
+    boxes = [Box(block, half, (200, 40, 40), 10), Box(plate, PLATE, (40, 60, 200), 12)]
     cover = Box(block @ se3.make(p=(0, 0, 0.1)), (0.12, 0.12, 0.02), (90, 90, 90), 11)
     seen = [
         observe([*boxes, cover] if hidden else boxes, HOME, opening, step, wrist=False, q=home_joints())
         for step, opening in enumerate((1.0, 0.6, 0.6))
     ]
     keyframes = (
-        Keyframe(seen[0], Action(block @ ON_BLOCK, False)),
+        Keyframe(seen[0], Action(block @ se3.make(p=(0, 0, half[2] - BLOCK[2])) @ ON_BLOCK, False)),
         Keyframe(seen[1], Action(plate @ ON_PLATE, True)),
     )
-    return Demonstration(keyframes, seen[2], "test/carry", 0, (), {"instance": 3, "episode": number})
+    return Demonstration(keyframes, seen[2], "test/carry", 0, (), {"instance": instance, "episode": number})
 
 
 @cache
@@ -82,6 +84,44 @@ def test_an_oblong_thing_has_two_right_motions():
     assert {len(p.T_query_support) for p in pairs} == {2}
 
 
+LONGER = (0.09, 0.03, 0.04)
+
+
+@cache
+def others():
+    return tuple(take(demonstration(number, half=LONGER, instance=4), None) for number in (1, 2, 0))
+
+
+def test_other_objects_are_paired_step_by_step_in_both_directions():
+    pairs = other_pairs(takes(), others())
+    aims = [(a.goal(step), b.goal(step)) for step in range(2) for a, b in zip(takes(), others(), strict=True)]
+    expected = [aim for step in (aims[:3], aims[3:]) for aim in (*step, *((b, a) for a, b in step))]
+    for pair, (shown, asked) in zip(pairs, expected, strict=True):
+        np.testing.assert_array_equal(pair.T_world_goal, shown)
+        np.testing.assert_allclose(pair.T_query_support[0] @ shown, asked, atol=1e-9)
+        assert len(pair.T_query_support) == 2
+
+
+def test_labels_say_where_the_other_object_is_longer():
+    """The block's ends stick out of the shorter one by 4 cm; what one cannot see of it has no label."""
+    # What is shown first comes first, step by step.
+    shown = other_pairs(others(), takes())[:3]
+    assert all(pair.gripper_open == (True, False) for pair in shown)
+    for pair in shown:
+        local = np.abs(se3.apply(se3.invert(pair.T_world_goal), pair.support.points)[:, 0])
+        label, end = pair.invariance, pair.region & (local > 0.085)
+        assert not np.isfinite(label[~pair.region]).any()
+        assert np.nanmedian(label[pair.region & (local < 0.04)]) < 0.005
+        assert np.nanmedian(label[end]) == pytest.approx(0.038, abs=0.012)
+        assert np.isfinite(label[end]).mean() > 0.5
+
+
+def test_another_step_gives_no_pair():
+    """Where the action is fixed to another object, the demonstrations of the two do not call for the same."""
+    swapped = [replace(t.demonstration, keyframes=t.demonstration.keyframes[::-1]) for t in others()]
+    assert other_pairs(takes(), [take(d, None) for d in swapped]) == []
+
+
 def test_a_step_whose_object_is_hidden_gives_no_pair():
     hidden = take(demonstration(2, hidden=True), None)
     pairs = group_pairs([*takes()[:2], hidden])
@@ -112,6 +152,20 @@ def test_shards_are_written_as_training_reads_them(store, tmp_path):
     assert write_recorded(store.path, tmp_path / "shards", 5, 0) == 5
     shard = Shard(tmp_path / "shards" / "shard-00000.npz")
     assert len(shard) == 5 and all(shard[i].region.any() for i in range(5))
+
+
+def test_the_share_of_pairs_with_other_objects_is_met(store, tmp_path):
+    for number in range(3):
+        store.append(demonstration(number, half=LONGER, instance=4))
+    assert write_recorded(store.path, tmp_path / "shards", 8, 0, others=0.5) == 8
+    shard = Shard(tmp_path / "shards" / "shard-00000.npz")
+    assert sum(shard[i].invariance is not None for i in range(8)) == 4
+
+
+@pytest.mark.parametrize(("share", "field"), [(0.5, "store"), (1.5, "others"), (float("nan"), "others")])
+def test_a_share_that_the_store_cannot_give_is_refused(store, tmp_path, share, field):
+    with pytest.raises(InvalidInput, match=field):
+        write_recorded(store.path, tmp_path / "shards", 5, 0, others=share)
 
 
 def test_what_belongs_to_nothing_is_refused(tmp_path):

@@ -27,6 +27,26 @@ def test_round_trip(tmp_path):
         assert wrote.gripper_open == read.gripper_open
 
 
+def test_labels_of_other_instances_are_kept_and_equal_ones_stay_without(tmp_path):
+    equal = pair()
+    label = np.where(equal.region, np.linspace(0, 0.08, len(equal.region)), np.nan)
+    write_shard([equal, replace(equal, invariance=label)], tmp_path / "a.npz")
+    shard = Shard(tmp_path / "a.npz")
+    assert shard[0].invariance is None
+    np.testing.assert_allclose(shard[1].invariance, label, atol=1e-4)
+
+
+def test_shards_without_labels_are_read_as_equal_things(tmp_path):
+    path = tmp_path / "old.npz"
+    write_shard([pair()], path)
+    with np.load(path) as file:
+        old = {name: file[name] for name in file.files if name not in ("invariance", "other_shape")}
+    np.savez_compressed(path, **old)
+    read = Shard(path)[0]
+    assert read.invariance is None
+    np.testing.assert_array_equal(read.region, pair().region)
+
+
 def test_shared_clouds_are_stored_once(tmp_path):
     write_shard([pair()], tmp_path / "one.npz")
     one = pair()

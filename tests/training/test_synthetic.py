@@ -11,7 +11,8 @@ from imop.training.scenes import Scene, demonstrate
 from imop.training.shards import Shard
 from imop.training.stage import Stage, State
 from imop.training.steps import press
-from imop.training.synthetic import right_motions, synthetic_pairs
+from imop.training.synthetic import synthetic_pairs
+from imop.training.takes import right_motions
 
 
 @pytest.fixture(scope="module")

@@ -32,7 +32,7 @@ def augment(pair: StepPair, rng: np.random.Generator) -> StepPair:
         pair = mirrored(pair)
     A, B = _motion(rng, pair.T_world_goal[:3, 3]), _motion(rng, pair.query.points.mean(axis=0))
     light = random_light(rng, 0.25)
-    support, region = _worse(pair.support, rng, pair.region)
+    support, kept = _worse(pair.support, rng, pair.region)
     after, _ = _worse(pair.after, rng)
     query, _ = _worse(pair.query, rng)
     light_query = light @ random_light(rng, 0.06)
@@ -41,7 +41,8 @@ def augment(pair: StepPair, rng: np.random.Generator) -> StepPair:
         support=_moved(_lit(support, light), A),
         after=_moved(_lit(after, light), A),
         query=_moved(_lit(query, light_query), B),
-        region=region,
+        region=pair.region[kept],
+        invariance=None if pair.invariance is None else pair.invariance[kept],
         T_world_goal=A @ pair.T_world_goal,
         T_world_now=A @ pair.T_world_now,
         T_query_support=B @ pair.T_query_support @ se3.invert(A),
@@ -92,8 +93,7 @@ def _moved(cloud: PointCloud, T: FloatArray) -> PointCloud:
 def _worse(
     cloud: PointCloud, rng: np.random.Generator, region: BoolArray | None = None
 ) -> tuple[PointCloud, BoolArray]:
-    """Fewer and noisier points; at least one of the region stays."""
-    inside = np.zeros(len(cloud), dtype=bool) if region is None else region
+    """Fewer and noisier points, and (N,) which are kept; at least one of the region stays."""
     keep = np.ones(len(cloud), dtype=bool)
     if len(cloud) > ENOUGH:
         keep = rng.random(len(cloud)) < rng.uniform(*KEEP_POINTS)
@@ -104,7 +104,7 @@ def _worse(
             keep[:] = True
     thinner = cloud.select(keep)
     noisy = thinner.points + rng.normal(0, JITTER, thinner.points.shape)
-    return replace(thinner, points=noisy), inside[keep]
+    return replace(thinner, points=noisy), keep
 
 
 def other_light(graph: Graph, lights: Sequence[FloatArray]) -> Graph:

@@ -9,10 +9,11 @@ from joblib import Parallel, delayed
 
 from imop.errors import CorruptData, InvalidInput
 from imop.training.families import HELD_OUT, TRAINING, Family
+from imop.training.instances import VARIATIONS, shares
 from imop.training.route_shards import RouteShard, write_routes
 from imop.training.routes import synthetic_routes
 from imop.training.shards import Shard, write_shard
-from imop.training.synthetic import synthetic_pairs
+from imop.training.synthetic import SAME_ONLY, synthetic_pairs
 
 SHARD = 500
 ROUTE_SHARD = 100
@@ -26,6 +27,7 @@ def generate(
     held_out: bool = False,
     routes: bool = False,
     names: Sequence[str] = (),
+    mix: Sequence[float] = SAME_ONLY,
 ) -> None:
     """Write `count` pairs, or routes, to numbered shards in `out`; whole shards that are there stay.
 
@@ -37,16 +39,18 @@ def generate(
         held_out: whether of the families for testing only.
         routes: whether examples for the routing network instead of pairs.
         names: of the families that the scenes are made of; none for all.
+        mix: of pairs, as in `synthetic_pairs`.
 
     Raises:
-        InvalidInput: if there is no such family.
+        InvalidInput: if there is no such family, or the mix is not four shares.
     """
     families = chosen(names, held_out)
+    shares(mix)
     out.mkdir(parents=True, exist_ok=True)
     full = ROUTE_SHARD if routes else SHARD
     sizes = [min(full, count - start) for start in range(0, count, full)]
     Parallel(n_jobs=jobs)(
-        delayed(_shard)(out / f"shard-{i:05d}.npz", size, _content(seed, i, held_out), families, routes)
+        delayed(_shard)(out / f"shard-{i:05d}.npz", size, _content(seed, i, held_out), families, routes, mix)
         for i, size in enumerate(sizes)
     )
 
@@ -68,13 +72,15 @@ def _content(seed: int, number: int, held_out: bool) -> int:
     return int(np.random.SeedSequence([seed, number, int(held_out)]).generate_state(1)[0])
 
 
-def _shard(path: Path, size: int, content: int, families: dict[str, Family], routes: bool) -> None:
+def _shard(
+    path: Path, size: int, content: int, families: dict[str, Family], routes: bool, mix: Sequence[float]
+) -> None:
     if _whole(path, size, routes):
         return
     if routes:
         write_routes(list(synthetic_routes(content, size, families)), path)
     else:
-        write_shard(list(synthetic_pairs(content, size, families)), path)
+        write_shard(list(synthetic_pairs(content, size, families, mix)), path)
     print(f"{path}: {size} {'routes' if routes else 'pairs'}", flush=True)
 
 
@@ -98,10 +104,18 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--held-out", action="store_true", help="families for testing only")
     parser.add_argument("--families", nargs="+", default=(), metavar="NAME", help="only these; default: all")
+    parser.add_argument(
+        "--mix",
+        nargs=len(VARIATIONS),
+        type=float,
+        default=SAME_ONLY,
+        metavar=tuple(name.upper() for name in VARIATIONS),
+        help="shares of pairs whose query shows the same things, others in colour, in shape, in both",
+    )
     args = parser.parse_args()
     routes = args.routes is not None
     count = args.routes if routes else args.pairs
-    generate(args.out, count, args.seed, args.jobs, args.held_out, routes, args.families)
+    generate(args.out, count, args.seed, args.jobs, args.held_out, routes, args.families, args.mix)
 
 
 if __name__ == "__main__":

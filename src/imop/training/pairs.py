@@ -34,6 +34,9 @@ class StepPair:
         gripper_open: whether it is open in s_i, and after the action.
         T_query_support: (S, 4, 4) every right motion of the region from s_i to s_j, S >= 1: several where the
             region is symmetric or the query shows equal instances.
+        invariance: (N,) how far points of the region are from their counterparts on the query's thing, both
+            seen from the action, metres; NaN outside the region and where it is not known. None if the
+            shapes are equal: all zero.
     """
 
     support: PointCloud
@@ -44,6 +47,7 @@ class StepPair:
     T_world_now: FloatArray
     gripper_open: tuple[bool, bool]
     T_query_support: FloatArray
+    invariance: FloatArray | None = None
 
     def __post_init__(self) -> None:
         for name in ("support", "after", "query"):
@@ -58,6 +62,8 @@ class StepPair:
             as_pose("T_query_support", T)
         if not len(self.T_query_support):
             raise InvalidInput("T_query_support", "no motion", "at least one right motion")
+        if self.invariance is not None:
+            as_array("invariance", self.invariance, (len(self.support),), np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +78,7 @@ class Sample:
         gripper: (2,) float32.
         cross, cross_back: nearest points between s_i and s_i'.
         region: (M,) float32, 1 in the region, of the finest points of `before`.
+        invariance: (M,) float32 metres, as in `StepPair`; NaN outside the region and where it is not known.
         chosen: (R,) int64, the points that are matched.
         targets: for each right motion (P, 2) int64: index into `chosen`, index into the query's points.
         right: (S, 4, 4) float64, the right motions themselves.
@@ -85,6 +92,7 @@ class Sample:
     cross: Tensor
     cross_back: Tensor
     region: Tensor
+    invariance: Tensor
     chosen: Tensor
     targets: tuple[Tensor, ...]
     right: Tensor
@@ -98,6 +106,7 @@ class PairBatch:
         step: what the region network sees.
         query: s_j, a batch.
         region: (M,) targets of the region network.
+        invariance: (M,) metres, NaN where there is no target.
         chosen: (R,) indices into the finest points of all `step.before`.
         targets: per sample, per right motion: (P, 2) row and column of the sample's correspondence matrix.
         right: per sample (S, 4, 4) float64, the right motions; stays on the CPU.
@@ -106,6 +115,7 @@ class PairBatch:
     step: StepBatch
     query: Graph
     region: Tensor
+    invariance: Tensor
     chosen: Tensor
     targets: tuple[tuple[Tensor, ...], ...]
     right: tuple[Tensor, ...]
@@ -113,7 +123,7 @@ class PairBatch:
     def to(self, device: torch.device | str) -> "PairBatch":
         """The same batch on a device."""
         targets = tuple(tuple(pairs.to(device) for pairs in motions) for motions in self.targets)
-        rest = (self.region.to(device), self.chosen.to(device))
+        rest = (self.region.to(device), self.invariance.to(device), self.chosen.to(device))
         return PairBatch(self.step.to(device), self.query.to(device), *rest, targets, self.right)
 
 
@@ -132,14 +142,18 @@ def make_sample(
     """
     before, after, query = (build_graph(c, config) for c in (pair.support, pair.after, pair.query))
     p_before = before.points.numpy().astype(np.float64)
-    label = pair.region[nearest(p_before, pair.support.points)[1][:, 0]]
+    stored = nearest(p_before, pair.support.points)[1][:, 0]
+    label = pair.region[stored]
     if not label.any():
         # The region is smaller than the grid: its nearest point stands for it.
         label[nearest(pair.support.points[pair.region], p_before)[1][0, 0]] = True
     chosen = np.flatnonzero(label) if region_first else np.sort(farthest_points(p_before, max_region))
     if len(chosen) > max_region:
         chosen = np.sort(rng.choice(chosen, max_region, replace=False))
+    far = np.zeros(len(stored)) if pair.invariance is None else pair.invariance[stored]
     poses = np.stack([pair.T_world_goal, pair.T_world_now]).astype(np.float32)
+    # What is known to have no counterpart near is matched to nothing, whatever else lies there.
+    matched = label & ~(far > MATCH_RADIUS)
     return Sample(
         before,
         after,
@@ -148,8 +162,9 @@ def make_sample(
         torch.tensor(pair.gripper_open, dtype=torch.float32),
         *cross_neighbours(before, after, config.neighbours),
         torch.from_numpy(label.astype(np.float32)),
+        torch.from_numpy(np.where(label, far, np.nan).astype(np.float32)),
         torch.from_numpy(chosen),
-        match_targets(p_before[chosen], label[chosen], query, pair.T_query_support),
+        match_targets(p_before[chosen], matched[chosen], query, pair.T_query_support),
         torch.from_numpy(np.array(pair.T_query_support, dtype=np.float64)),
     )
 
@@ -193,6 +208,7 @@ def collate_samples(samples: Sequence[Sample]) -> PairBatch:
         step,
         collate([s.query for s in samples]),
         torch.cat([s.region for s in samples]),
+        torch.cat([s.invariance for s in samples]),
         torch.cat([s.chosen + start for s, start in zip(samples, first_before, strict=True)]),
         tuple(s.targets for s in samples),
         tuple(s.right for s in samples),

@@ -5,128 +5,24 @@ Nobody annotates anything: regions come from Eq. (3), right motions from the rec
 
 import argparse
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
 from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
 
-from imop.demos.regions import SegmentedState, by_aim, invariant_region, segmented
+from imop.demos.regions import by_aim
 from imop.demos.store import DemonstrationStore
 from imop.errors import InvalidInput
-from imop.geometry.cloud import PointCloud
-from imop.geometry.perception import Perception, RobotMask
-from imop.networks.graph import thin
 from imop.robots.panda import panda_self_filter
 from imop.training.pairs import StepPair
+from imop.training.recorded_across import other_pairs
+from imop.training.recorded_takes import Take, group_pairs, take
 from imop.training.shards import write_shard
-from imop.training.stage import STORED
-from imop.training.symmetry import Scene, Surface, equal_motions
-from imop.types import BoolArray, Demonstration, FloatArray, Observation
 
 SHARD = 500
 MOST = 6
 """Demonstrations that are paired with each other; more of the same make several groups."""
-INVARIANT = 0.01
-"""A region whose points are farther off than this in the partners is none, metres."""
-OPEN = 0.9
-"""A gripper is open from here on, as a policy sees it."""
-_FEWEST_REGION, _FEWEST_QUERY = 12, 10
-
-
-@dataclass(frozen=True, eq=False)
-class Take:
-    """A demonstration as clouds: one for each step, and one after the last.
-
-    Attributes:
-        demonstration: where it comes from.
-        full: what a policy would see, with instance ids.
-        clouds: the same as training stores it.
-        segments: for each step, its objects in the frame of its action.
-    """
-
-    demonstration: Demonstration
-    full: tuple[PointCloud, ...]
-    clouds: tuple[PointCloud, ...]
-    segments: tuple[SegmentedState, ...]
-
-    def goal(self, step: int) -> FloatArray:
-        """T_world_goal (4, 4) of a step."""
-        return self.demonstration.keyframes[step].action.T_world_gripper
-
-    def observation(self, step: int) -> Observation:
-        """What was seen before a step."""
-        return self.demonstration.keyframes[step].observation
-
-    def part(self, step: int, names: Sequence[str]) -> PointCloud:
-        """What is seen of these instances before a step."""
-        return self.full[step].select(self.shows(self.full[step], step, names))
-
-    def shows(self, cloud: PointCloud, step: int, names: Sequence[str]) -> BoolArray:
-        """(N,) True for the points of a cloud of that step that belong to these instances."""
-        known = self.observation(step).instance_names
-        assert known is not None and cloud.ids is not None
-        return np.isin(cloud.ids, [i for i, name in known.items() if name in names])
-
-
-def take(demonstration: Demonstration, robot_mask: RobotMask | None) -> Take:
-    """Look at every state of a demonstration.
-
-    Raises:
-        InvalidInput: if it has no segmentation.
-    """
-    keyframes = demonstration.keyframes
-    segments = tuple(segmented(keyframe) for keyframe in keyframes)
-    perceive = Perception(robot_mask)
-    full = tuple(perceive(o) for o in (*(k.observation for k in keyframes), demonstration.final))
-    return Take(demonstration, full, tuple(thin(cloud, STORED)[0] for cloud in full), segments)
-
-
-def group_pairs(takes: Sequence[Take]) -> list[StepPair]:
-    """All pairs of takes of the same task, variation and objects: every step, in both directions.
-
-    Steps whose region is hidden, or where nothing stays in place in the partners, give none.
-    """
-    found = []
-    steps = min((len(t.demonstration) for t in takes), default=0)
-    for step in range(steps):
-        scenes = {id(t): Scene(t.full[step], t.observation(step)) for t in takes}
-        for support in takes:
-            others = [t for t in takes if t is not support]
-            if not others:
-                return []
-            region = invariant_region(support.segments[step], [t.segments[step] for t in others])
-            if not region.names or region.displacement[region.names[0]] > INVARIANT:
-                continue
-            surface = Surface.pooled((t.part(step, region.names), t.goal(step)) for t in takes)
-            for query in others:
-                pair = _pair(support, query, step, region.names, surface, scenes[id(query)])
-                if pair is not None:
-                    found.append(pair)
-    return found
-
-
-def _pair(
-    support: Take, query: Take, step: int, names: tuple[str, ...], surface: Surface, scene: Scene
-) -> StepPair | None:
-    cloud = support.clouds[step]
-    mask = support.shows(cloud, step, names)
-    seen = query.shows(query.clouds[step], step, names)
-    if mask.sum() < _FEWEST_REGION or seen.sum() < _FEWEST_QUERY:
-        return None
-    keyframe = support.demonstration.keyframes[step]
-    later = [query.goal(s) for s in range(step + 1, len(query.demonstration))]
-    return StepPair(
-        cloud,
-        support.clouds[step + 1],
-        query.clouds[step],
-        mask,
-        keyframe.action.T_world_gripper,
-        keyframe.observation.T_world_gripper,
-        (keyframe.observation.gripper_opening > OPEN, keyframe.action.gripper_open),
-        equal_motions(surface, scene, support.goal(step), query.goal(step), later),
-    )
 
 
 def groups(store: DemonstrationStore, seed: int) -> list[list[int]]:
@@ -142,27 +38,73 @@ def groups(store: DemonstrationStore, seed: int) -> list[list[int]]:
     return [group for row in zip_longest(*by_task.values()) for group in row if group]
 
 
-def recorded_pairs(store: DemonstrationStore, seed: int = 0) -> Iterator[StepPair]:
-    """Every pair of a store, group by group.
+def recorded_pairs(store: DemonstrationStore, seed: int = 0, others: float = 0.0) -> Iterator[StepPair]:
+    """Pairs of a store, group by group, until those that are due next are used up.
+
+    Args:
+        store: of demonstrations.
+        seed: of the order of the groups.
+        others: share of the pairs whose query shows other objects than the demonstration.
 
     Raises:
-        InvalidInput: if no two demonstrations show the same task with the same objects.
+        InvalidInput: if the share is none, or no demonstrations belong together in the way that is asked for.
     """
+    if not 0 <= others <= 1:
+        raise InvalidInput("others", f"{others}", "a share, 0 to 1")
     found = groups(store, seed)
     if not found:
         accepted = "two or more of the same task, variation and objects: imop collect --scenes 3"
         raise InvalidInput("store", f"no two of the {len(store)} demonstrations belong together", accepted)
-    is_robot = panda_self_filter().is_robot
+    couples = _couples(store, found)
+    if others and not couples:
+        accepted = "two or more sets of objects of the same task and variation, each in several scenes"
+        raise InvalidInput("store", f"no two of the {len(found)} groups are of the same task", accepted)
+    streams = (_same(store, found), _others(store, couples))
+    made = [0, 0]
+    while True:
+        due = int(others * (sum(made) + 1) - made[1] > (1 - others) * (sum(made) + 1) - made[0])
+        pair = next(streams[due], None)
+        if pair is None:
+            return
+        made[due] += 1
+        yield pair
+
+
+def _couples(store: DemonstrationStore, found: list[list[int]]) -> list[tuple[list[int], list[int]]]:
+    """Every group with the one before of the same task and variation, if that has other objects."""
+    aim = {number: key for key, numbers in by_aim(store).items() for number in numbers}
+    last: dict[tuple[str, int], list[int]] = {}
+    couples = []
     for group in found:
-        yield from group_pairs([take(store[number], is_robot) for number in group])
+        task, variation, instance = aim[group[0]]
+        before = last.get((task, variation))
+        if before is not None and aim[before[0]][2] != instance:
+            couples.append((before, group))
+        last[task, variation] = group
+    return couples
 
 
-def write_recorded(store: Path, out: Path, pairs: int, seed: int) -> int:
-    """Write up to `pairs` pairs to numbered shards in `out`; returns how many there are."""
+def _same(store: DemonstrationStore, found: list[list[int]]) -> Iterator[StepPair]:
+    for group in found:
+        yield from group_pairs(_takes(store, group))
+
+
+def _others(store: DemonstrationStore, couples: list[tuple[list[int], list[int]]]) -> Iterator[StepPair]:
+    for first, second in couples:
+        yield from other_pairs(_takes(store, first), _takes(store, second))
+
+
+def _takes(store: DemonstrationStore, group: list[int]) -> list[Take]:
+    is_robot = panda_self_filter().is_robot
+    return [take(store[number], is_robot) for number in group]
+
+
+def write_recorded(store: Path, out: Path, pairs: int, seed: int, others: float = 0.0) -> int:
+    """Write up to `pairs` of `recorded_pairs` to numbered shards in `out`; returns how many there are."""
     out.mkdir(parents=True, exist_ok=True)
     waiting: list[StepPair] = []
     written = number = 0
-    for pair in recorded_pairs(DemonstrationStore.open(store), seed):
+    for pair in recorded_pairs(DemonstrationStore.open(store), seed, others):
         waiting.append(pair)
         last = written + len(waiting) == pairs
         if len(waiting) == SHARD or last:
@@ -183,8 +125,12 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder of the shards")
     parser.add_argument("--pairs", type=int, required=True, help="at most so many")
     parser.add_argument("--seed", type=int, default=0, help="of the order of the groups")
+    parser.add_argument(
+        "--others", type=float, default=0.0, metavar="SHARE", help="share of pairs with other objects"
+    )
     args = parser.parse_args()
-    print(f"{write_recorded(args.store, args.out, args.pairs, args.seed)} pairs in {args.out}")
+    written = write_recorded(args.store, args.out, args.pairs, args.seed, args.others)
+    print(f"{written} pairs in {args.out}")
 
 
 if __name__ == "__main__":

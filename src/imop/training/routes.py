@@ -14,7 +14,7 @@ from imop.training.families.thing import Family
 from imop.training.mishaps import Mishap, mishaps
 from imop.training.scenes import Scene, demonstrate, draw_scene
 from imop.training.stage import State, Unreachable
-from imop.training.synthetic import Poses
+from imop.training.takes import Poses
 from imop.types import BoolArray, FloatArray, as_array, as_pose
 
 IMAGE = 64

@@ -1,4 +1,4 @@
-"""Random scenes of procedural things, with something to do in them, demonstrated several times."""
+"""Scenes of procedural things, with something to do in them, demonstrated several times."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,14 +7,15 @@ import numpy as np
 
 from imop.geometry import se3
 from imop.robots.panda import PANDA_HOME_Q
+from imop.sim.cameras import Camera
 from imop.training import steps
-from imop.training.families.thing import Family, Thing
+from imop.training.families.thing import Family
+from imop.training.plans import Part, Plan, draw_plan
 from imop.training.stage import Stage, State, Unreachable, above_table
 from imop.training.steps import Recipe
 from imop.training.viewpoints import placed_cameras
 from imop.types import BoolArray, FloatArray
 
-MOST_THINGS = 8
 _LOWER, _UPPER, _CELL = np.array((-0.16, -0.48)), np.array((0.62, 0.48)), 0.012
 _AREA = ((-0.02, 0.46), (-0.38, 0.38))
 _AWAY = se3.make(p=(3.0, 0.0, -5.0))
@@ -38,90 +39,30 @@ class Scene:
     families: tuple[str, ...] = ()
 
 
-class _Cast:
-    """Draws things and remembers how, so that they can be drawn again in another shape or colour."""
-
-    def __init__(self, families: Mapping[str, Family], rng: np.random.Generator):
-        self.families, self.rng = families, rng
-        self.things: list[Thing] = []
-        self.kinds: list[int] = []
-        self._seeds: list[tuple[str, int, int]] = []
-
-    def add(self, name: str | None = None, shape: int | None = None, color: int | None = None) -> int:
-        """Add one of a family; what is not given is random. Returns its number."""
-        name = str(self.rng.choice(list(self.families))) if name is None else name
-        drawn = self.rng.integers(2**32, size=2).tolist()
-        seeds = (name, drawn[0] if shape is None else shape, drawn[1] if color is None else color)
-        thing = self.families[name](np.random.default_rng(seeds[1]), np.random.default_rng(seeds[2]))
-        self.kinds.append(self._seeds.index(seeds) if seeds in self._seeds else len(self._seeds))
-        self.things.append(thing)
-        self._seeds.append(seeds)
-        return len(self.things) - 1
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Their families."""
-        return tuple(name for name, _, _ in self._seeds)
-
-    def where(self, wanted: str) -> int:
-        """Add a random thing that has some of the attribute `wanted`."""
-        for _ in range(200):
-            number = self.add()
-            offered = getattr(self.things[number], wanted)
-            if offered is not None and len(offered):
-                return number
-            for items in (self.things, self.kinds, self._seeds):
-                items.pop()
-        raise Unreachable(f"no family has {wanted}")
-
-    def distract(self, number: int) -> None:
-        """Add things that resemble one."""
-        name, shape, color = self._seeds[number]
-        if self.rng.random() < 0.4:
-            self.add(name, shape=shape)
-        if self.rng.random() < 0.25:
-            self.add(None if self.rng.random() < 0.5 else name, color=color)
-        if self.rng.random() < 0.2:
-            self.add(name, shape, color)
+def build(plan: Plan, cameras: Mapping[str, Camera], rng: np.random.Generator) -> Scene:
+    """Compile a plan; how exactly things are done is drawn from `rng`."""
+    stage = Stage(plan.things, cameras)
+    recipes = [_recipe(stage, part, rng) for part in plan.parts]
+    recipe = recipes[0]
+    for other in recipes[1:]:
+        recipe = recipe.then(other)
+    kinds = tuple(plan.draws.index(draw) for draw in plan.draws)
+    return Scene(stage, kinds, recipe, tuple(draw.family for draw in plan.draws))
 
 
 def draw_scene(
     families: Mapping[str, Family], rng: np.random.Generator, parts_odds: tuple[float, ...] = (0.65, 0.35)
 ) -> Scene:
-    """A scene with one thing to do, or two, or as many as `parts_odds` has chances for.
+    """A scene of what `draw_plan` draws.
 
     Raises:
         Unreachable: if no family can play a part that was drawn.
     """
-    cast = _Cast(families, rng)
-    parts: list[tuple[str, int, int, int]] = []
-    for _ in range(int(rng.choice(1 + np.arange(len(parts_odds)), p=parts_odds))):
-        kind = str(rng.choice(("carry", "use", "operate", "press", "push"), p=(0.45, 0.12, 0.27, 0.06, 0.1)))
-        if kind == "carry":
-            below = cast.where("spots") if rng.random() < 0.15 else -1
-            parts.append((kind, cast.where("holds"), cast.where("spots"), below))
-        elif kind == "use":
-            parts.append((kind, cast.where("tool"), cast.add(), -1))
-        elif kind == "operate":
-            parts.append((kind, cast.where("moving"), -1, -1))
-        else:
-            parts.append((kind, cast.where("holds"), -1, -1))
-    acting = len(cast.things)
-    for number in range(acting):
-        cast.distract(number)
-    for _ in range(int(rng.integers(1, 4))):
-        cast.add()
-    for items in (cast.things, cast.kinds):
-        del items[max(MOST_THINGS, acting) :]
-    stage = Stage(cast.things, placed_cameras(rng.spawn(1)[0]))
-    recipes = [_recipe(stage, part, rng) for part in parts]
-    recipe = recipes[0]
-    for other in recipes[1:]:
-        recipe = recipe.then(other)
-    return Scene(stage, tuple(cast.kinds), recipe, cast.names[: len(cast.things)])
+    plan = draw_plan(families, rng, parts_odds)
+    return build(plan, placed_cameras(rng.spawn(1)[0]), rng)
 
 
-def _recipe(stage: Stage, part: tuple[str, int, int, int], rng: np.random.Generator) -> Recipe:
+def _recipe(stage: Stage, part: Part, rng: np.random.Generator) -> Recipe:
     kind, first, second, below = part
     if kind == "carry":
         return steps.carry(stage, first, second, rng, None if below < 0 else below)

@@ -27,6 +27,8 @@ def write_shard(pairs: Sequence[StepPair], path: Path) -> None:
         "pair_clouds": np.array([[number[id(c)] for c in (p.support, p.after, p.query)] for p in pairs]),
         "region": np.concatenate([p.region for p in pairs]),
         "region_start": starts([len(p.region) for p in pairs]),
+        "invariance": np.concatenate([_invariance(p) for p in pairs]),
+        "other_shape": np.array([p.invariance is not None for p in pairs]),
         "poses": np.stack([np.stack([p.T_world_goal, p.T_world_now]) for p in pairs]),
         "gripper": np.array([p.gripper_open for p in pairs]),
         "motions": np.concatenate([p.T_query_support for p in pairs]),
@@ -61,7 +63,10 @@ class Shard:
         goal, now = a["poses"][index]
         opened = (bool(a["gripper"][index, 0]), bool(a["gripper"][index, 1]))
         region, motions = a["region"][first:last], a["motions"][begin:end]
-        return StepPair(support, after, query, region, goal, now, opened, motions)
+        # Shards without these arrays show equal things twice.
+        other = "other_shape" in a and a["other_shape"][index]
+        invariance = a["invariance"][first:last].astype(np.float64) if other else None
+        return StepPair(support, after, query, region, goal, now, opened, motions, invariance)
 
 
 def cloud_arrays(clouds: Sequence[PointCloud]) -> dict[str, NDArray[Any]]:
@@ -113,6 +118,12 @@ def read_arrays(path: Path, version: int, wanted: str) -> dict[str, NDArray[Any]
 def starts(lengths: Sequence[int]) -> NDArray[np.int64]:
     """(N + 1,) where each of N parts of the given lengths begins, and the end."""
     return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+
+
+def _invariance(pair: StepPair) -> NDArray[np.float16]:
+    """(N,) with zeros for equal shapes. Half floats are exact to 0.1 mm up to 20 cm."""
+    zero = np.zeros(len(pair.region))
+    return (zero if pair.invariance is None else pair.invariance).astype(np.float16)
 
 
 def _normals(cloud: PointCloud) -> NDArray[np.float64]:

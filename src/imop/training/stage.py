@@ -168,6 +168,11 @@ class Stage:
         self.pose(state)
         return noise(observe(self._world, size=size, cameras=self._cameras), rng)
 
+    def clean(self, state: State, cameras: Mapping[str, Camera], size: int) -> Observation:
+        """What these cameras would see without any noise."""
+        self.pose(state)
+        return observe(self._world, size=size, cameras=cameras)
+
     def cloud(
         self,
         state: State,

@@ -86,7 +86,7 @@ class Scene:
         observed, touching = self._observed(points, surface.colors)
         alone = touching < 0
         refuted = ~observed & ~alone
-        refuted[alone] = self._seen_through(points[alone])
+        refuted[alone] = self.seen_through(points[alone])
         return float(refuted.mean()), float(observed.mean())
 
     def uncovered(self, surface: Surface, T: FloatArray) -> float:
@@ -111,8 +111,8 @@ class Scene:
         observed = np.any(near & _alike(colors[:, None], self._colors[index]), axis=1)
         return np.asarray(observed), np.where(near[:, 0], index[:, 0], -1)
 
-    def _seen_through(self, points: FloatArray) -> BoolArray:
-        """(N,) True where a camera measured something well behind a point."""
+    def seen_through(self, points: FloatArray) -> BoolArray:
+        """(N,) True where a camera measured something well behind a point (N, 3), world frame."""
         through = np.zeros(len(points), dtype=bool)
         for view in self._views:
             (column, row), z, inside = (part.T for part in project(view, points))

@@ -1,164 +1,73 @@
-"""Training pairs from procedural scenes, with the truth that only their maker knows."""
+"""Training pairs from procedural scenes: the same things twice, or others of their kind."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from imop.geometry import se3
-from imop.geometry.cloud import PointCloud
-from imop.training.depth_noise import DepthNoise
-from imop.training.families.thing import Family, Thing, revolution
+from imop.errors import InvalidInput
+from imop.training.across import pairs_across
+from imop.training.families.thing import Family
+from imop.training.instances import VARIATIONS, Variation, shares
 from imop.training.pairs import StepPair
-from imop.training.scenes import Scene, demonstrate, draw_scene
-from imop.training.stage import State, Unreachable
-from imop.types import FloatArray
+from imop.training.scenes import draw_scene
+from imop.training.stage import Unreachable
+from imop.training.takes import make_pair, take
 
 TAKES = 2
 """How often a scene's recipe is demonstrated; every two takes make pairs. New scenes teach more than new
 takes of old ones."""
-_SAME_PLACE, _SAME_TURN = 0.002, np.radians(1.0)
-_FEWEST_REGION, _FEWEST_QUERY = 12, 10
-
-Poses = dict[tuple[int, str], FloatArray]
-
-
-@dataclass(frozen=True, eq=False)
-class Take:
-    """One demonstration of a scene's recipe.
-
-    Attributes:
-        states: before the first step, and after each.
-        clouds: what was seen in each state, with instance ids.
-        poses: the links in each state.
-    """
-
-    states: tuple[State, ...]
-    clouds: tuple[PointCloud, ...]
-    poses: tuple[Poses, ...]
+_PATIENCE = 500
+"""So many scenes in a row may give no pair."""
+SAME_ONLY = (1.0, 0.0, 0.0, 0.0)
 
 
-def synthetic_pairs(seed: int, count: int, families: Mapping[str, Family]) -> Iterator[StepPair]:
-    """`count` pairs, the same for the same seed and families."""
-    rng = np.random.default_rng(seed)
-    made = 0
-    while made < count:
-        for pair in _scene_pairs(families, rng):
-            yield pair
-            made += 1
-            if made == count:
-                return
+def synthetic_pairs(
+    seed: int, count: int, families: Mapping[str, Family], mix: Sequence[float] = SAME_ONLY
+) -> Iterator[StepPair]:
+    """`count` pairs, the same for the same seed, families and mix.
 
+    Those that show the same things twice are the first ones of `SAME_ONLY`, whatever the mix.
 
-def _scene_pairs(families: Mapping[str, Family], rng: np.random.Generator) -> list[StepPair]:
-    try:
-        scene = draw_scene(families, rng)
-        takes = [take(scene, rng) for _ in range(TAKES)]
-    except Unreachable:
-        return []
-    found = []
-    for step in range(len(scene.recipe.steps)):
-        for support, query in permutations(takes, 2):
-            pair = make_pair(scene, support, query, step)
-            if pair is not None:
-                found.append(pair)
-    return found
-
-
-def take(scene: Scene, rng: np.random.Generator) -> Take:
-    """Demonstrate and look.
+    Args:
+        seed: of everything that is drawn.
+        count: how many.
+        families: of the things.
+        mix: shares of pairs that show the same things, other colours, other shapes, and both.
 
     Raises:
-        Unreachable: if the arm cannot do it.
+        InvalidInput: if the mix is not four shares, or the families cannot give a pair of it.
     """
-    states = demonstrate(scene, rng)
-    noise = DepthNoise.sample(rng)
-    clouds = tuple(scene.stage.cloud(state, noise, rng) for state in states)
-    return Take(tuple(states), clouds, tuple(scene.stage.link_poses(state) for state in states))
+    wanted = shares(mix)
+    streams = {variation: _pairs(families, variation, seed) for variation in wanted}
+    made = dict.fromkeys(wanted, 0)
+    for number in range(1, count + 1):
+        due = max(wanted, key=lambda variation: wanted[variation] * number - made[variation])
+        made[due] += 1
+        yield next(streams[due])
 
 
-def make_pair(scene: Scene, support: Take, query: Take, step: int) -> StepPair | None:
-    """The pair of a step in two takes; None if one of them does not see enough of what matters."""
-    action = scene.recipe.steps[step]
-    before, now = support.poses[step], query.poses[step]
-    reference = (action.thing, action.link)
-    members = rigid_with(reference, before, now)
-    motions = right_motions(scene, reference, members, before, now)
-    ids = support.clouds[step].ids
-    seen = query.clouds[step].ids
-    assert ids is not None and seen is not None
-    region = np.isin(ids, instances(scene, members))
-    if region.sum() < _FEWEST_REGION or np.isin(seen, instances(scene, members)).sum() < _FEWEST_QUERY:
-        return None
-    return StepPair(
-        support.clouds[step],
-        support.clouds[step + 1],
-        query.clouds[step],
-        region,
-        support.states[step + 1].T_world_gripper,
-        support.states[step].T_world_gripper,
-        (support.states[step].gripper_open, support.states[step + 1].gripper_open),
-        motions,
-    )
+def _pairs(families: Mapping[str, Family], variation: Variation, seed: int) -> Iterator[StepPair]:
+    """Pairs of one variation without end."""
+    number = VARIATIONS.index(variation)
+    rng = np.random.default_rng((seed, number) if number else seed)
+    fruitless = 0
+    while fruitless < _PATIENCE:
+        try:
+            made = _same(families, rng) if variation == "same" else pairs_across(families, variation, rng)
+        except Unreachable:
+            made = []
+        yield from made
+        fruitless = 0 if made else fruitless + 1
+    raise InvalidInput("mix", f"no pair of {variation} in {_PATIENCE} scenes", "more families, or less of it")
 
 
-def instances(scene: Scene, members: list[tuple[int, str]]) -> NDArray[np.int32]:
-    """Instance ids of links."""
-    return np.array([scene.stage.links[thing][link] for thing, link in members], dtype=np.int32)
-
-
-def rigid_with(reference: tuple[int, str], before: Poses, now: Poses) -> list[tuple[int, str]]:
-    """The links that stand to a link in one state as they do in another: the paper's I(s), with its ties."""
-    M = now[reference] @ se3.invert(before[reference])
-    return [link for link, T in before.items() if _same(now[link], M @ T)]
-
-
-def right_motions(
-    scene: Scene, reference: tuple[int, str], members: list[tuple[int, str]], before: Poses, now: Poses
-) -> FloatArray:
-    """(S, 4, 4) motions that carry every member onto itself or onto an equal thing, the plain one first."""
-    thing, link = reference
-    found = []
-    for twin in _twins(scene, thing):
-        for turn in _turns(scene, thing, link):
-            M = now[twin, link] @ turn @ se3.invert(before[reference])
-            if all(_covered(scene, member, M @ before[member], now) for member in members):
-                found.append(M)
-    return np.stack(found)
-
-
-def _covered(scene: Scene, member: tuple[int, str], T: FloatArray, now: Poses) -> bool:
-    """Whether a link or one like it looks as if it stood at `T`."""
-    thing, link = member
-    rounded = link == "body" and is_round(scene.stage.things[thing])
-    return any(
-        _same(now[twin, link] @ turn, T, rounded)
-        for twin in _twins(scene, thing)
-        for turn in _turns(scene, thing, link)
-    )
-
-
-def _twins(scene: Scene, thing: int) -> list[int]:
-    """The thing, and then those that are equal to it."""
-    equal = [i for i, kind in enumerate(scene.kinds) if kind == scene.kinds[thing] and i != thing]
-    return [thing, *equal]
-
-
-def _turns(scene: Scene, thing: int, link: str) -> FloatArray:
-    return scene.stage.things[thing].symmetry if link == "body" else np.eye(4)[None]
-
-
-def is_round(thing: Thing) -> bool:
-    """Whether it is a surface of revolution."""
-    return thing.symmetry.shape == revolution().shape and bool(np.allclose(thing.symmetry, revolution()))
-
-
-def _same(A: FloatArray, B: FloatArray, rounded: bool = False) -> bool:
-    """Whether two poses agree; of what is `rounded` only the z axis counts."""
-    if se3.translation_distance(A, B) > _SAME_PLACE:
-        return False
-    if rounded:
-        return bool(A[:3, 2] @ B[:3, 2] > np.cos(_SAME_TURN))
-    return bool(se3.rotation_distance(A, B) < _SAME_TURN)
+def _same(families: Mapping[str, Family], rng: np.random.Generator) -> list[StepPair]:
+    scene = draw_scene(families, rng)
+    takes = [take(scene, rng) for _ in range(TAKES)]
+    found = [
+        make_pair(scene, support, query, step)
+        for step in range(len(scene.recipe.steps))
+        for support, query in permutations(takes, 2)
+    ]
+    return [pair for pair in found if pair is not None]
