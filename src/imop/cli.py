@@ -336,7 +336,7 @@ def tasks(
     return 0
 
 
-@app.command
+@app.command(name="check-task")
 def check_task(task: Positional[str]) -> int:
     """Say what is wrong with a task of one's own, and how to mend it.
 
