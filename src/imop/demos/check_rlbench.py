@@ -17,12 +17,25 @@ from imop.demos.rlbench import (
 )
 from imop.errors import ImopError
 from imop.geometry import se3
+from imop.types import Demonstration
 
 NEAR_FRAMES = 5
 
 
-def check_episode(folder: Path, cameras: Sequence[str], tip_pose: TipPose | None = None) -> Iterator[Finding]:
-    """Everything that looks wrong in one episode folder; the last finding may be what makes it unreadable."""
+def check_episode(
+    folder: Path,
+    cameras: Sequence[str],
+    tip_pose: TipPose | None = None,
+    demonstration: Demonstration | None = None,
+) -> Iterator[Finding]:
+    """Everything that looks wrong in one episode folder; the last finding may be what makes it unreadable.
+
+    Args:
+        folder: of the episode.
+        cameras: which it should have.
+        tip_pose: as in `check`.
+        demonstration: what `read_episode` gave for these cameras; read from the folder if None.
+    """
     present = [c for c in cameras if all((folder / f"{c}_{kind}").is_dir() for kind in ("rgb", "depth"))]
     for camera in cameras:
         if camera not in present:
@@ -35,7 +48,8 @@ def check_episode(folder: Path, cameras: Sequence[str], tip_pose: TipPose | None
         yield from _poses(frames, str(folder / LOW_DIM))
         yield from _rests(frames, str(folder / LOW_DIM))
         if present:
-            yield from check_demonstration(read_episode(folder, present), str(folder), tip_pose)
+            read = read_episode(folder, present) if demonstration is None else demonstration
+            yield from check_demonstration(read, str(folder), tip_pose)
     except ImopError as error:
         yield Finding.of(error, str(folder))
 

@@ -24,16 +24,11 @@ def load_demonstrations(
         CorruptData: if there is none, one cannot be read or lacks one of `cameras`.
         InvalidInput: if `path` is neither.
     """
-    if (path / "zarr.json").is_file():
-        store = DemonstrationStore.open(path)
-        found = [store[i] for i in range(len(store) if count is None else min(count, len(store)))]
-        if cameras is not None:
-            found = [_with_cameras(path, demonstration, cameras) for demonstration in found]
-    else:
-        found = [read_episode(episode, cameras) for episode in episodes(path)[:count]]
-    if not found:
-        raise CorruptData(path, "holds no demonstration", "record or import one into it")
-    return found
+    known = _known(path)
+    numbers = range(len(known) if count is None else min(count, len(known)))
+    if not numbers:
+        raise _nothing(path)
+    return [_read(path, known[number], cameras) for number in numbers]
 
 
 def load_demonstration(path: Path, episode: int = 0) -> Demonstration:
@@ -43,14 +38,27 @@ def load_demonstration(path: Path, episode: int = 0) -> Demonstration:
         CorruptData: if there is none, or it cannot be read.
         InvalidInput: if `path` is neither, or has no such episode.
     """
-    in_store = (path / "zarr.json").is_file()
-    known = DemonstrationStore.open(path) if in_store else episodes(path)
+    known = _known(path)
     if not len(known):
-        raise CorruptData(path, "holds no demonstration", "record or import one into it")
+        raise _nothing(path)
     if not 0 <= episode < len(known):
         raise InvalidInput("episode", f"{episode}", f"0 .. {len(known) - 1} for {path}")
-    found = known[episode]
-    return read_episode(found) if isinstance(found, Path) else found
+    return _read(path, known[episode], None)
+
+
+def _known(path: Path) -> DemonstrationStore | list[Path]:
+    """The episodes by number, none of them read yet."""
+    return DemonstrationStore.open(path) if (path / "zarr.json").is_file() else episodes(path)
+
+
+def _nothing(path: Path) -> CorruptData:
+    return CorruptData(path, "holds no demonstration", "record or import one into it")
+
+
+def _read(path: Path, found: Demonstration | Path, cameras: Sequence[str] | None) -> Demonstration:
+    if isinstance(found, Path):
+        return read_episode(found, cameras)
+    return found if cameras is None else _with_cameras(path, found, cameras)
 
 
 def _with_cameras(path: Path, demonstration: Demonstration, cameras: Sequence[str]) -> Demonstration:

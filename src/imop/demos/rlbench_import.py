@@ -73,7 +73,7 @@ def import_rlbench(
         if digest in known:
             there_already += 1
             continue
-        findings += check_episode(folder, list(demonstration.final.views), tip_pose)
+        findings += check_episode(folder, list(demonstration.final.views), tip_pose, demonstration)
         try:
             store.append(demonstration)
         except OSError as error:
