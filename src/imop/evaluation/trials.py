@@ -82,11 +82,10 @@ def suite_trials(
     if seed + episodes > DEMONSTRATION_SEED:
         problem = f"{episodes} scenes from {seed} on"
         raise InvalidInput("seed", problem, f"scenes below {DEMONSTRATION_SEED}, where demonstrations begin")
+    variations = {name: find_task(name).variations for name in chosen_tasks(suite, split, tasks)}
     return {
-        name.removeprefix(f"{suite}/"): [
-            Trial(name, seed + i, i % find_task(name).variations, instance) for i in range(episodes)
-        ]
-        for name in chosen_tasks(suite, split, tasks)
+        name.removeprefix(f"{suite}/"): [Trial(name, seed + i, i % count, instance) for i in range(episodes)]
+        for name, count in variations.items()
     }
 
 

@@ -31,12 +31,17 @@ def find_suite(name: str) -> Suite:
     Raises:
         InvalidInput: if there is none, or it is no suite.
     """
+    suite = _known(name)
+    if suite is None:
+        raise InvalidInput("suite", name, f"{', '.join(SUITES)}, or {_SUITE}")
+    return suite
+
+
+def _known(name: str) -> Suite | None:
     if name in SUITES:
         return SUITES[name]
     found = plugins.find("suite", name, "imop.suites")
-    if found is None:
-        raise InvalidInput("suite", name, f"{', '.join(SUITES)}, or {_SUITE}")
-    return _suite(name, found)
+    return None if found is None else _suite(name, found)
 
 
 def _suite(name: str, found: Any) -> Suite:
@@ -60,18 +65,14 @@ def find_task(name: str) -> type[Task]:
     Raises:
         InvalidInput: if there is none, or it is no task.
     """
-    tasks = _tasks_of(name.rpartition("/")[0])
+    suite = _known(name.rpartition("/")[0])
+    tasks = {} if suite is None else suite["all"]
     if name in tasks:
         return tasks[name]
     found = None if tasks and ":" in name else plugins.find("task", name, "imop.tasks")
     if found is None:
         raise InvalidInput("task", name, f"{_nearest(name, tasks)}, or {_TASK}")
     return _task(name, found)
-
-
-def _tasks_of(suite: str) -> Mapping[str, type[Task]]:
-    known = suite in SUITES or plugins.find("suite", suite, "imop.suites") is not None
-    return find_suite(suite)["all"] if known else {}
 
 
 def _nearest(name: str, tasks: Mapping[str, type[Task]]) -> str:
