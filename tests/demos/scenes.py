@@ -48,6 +48,7 @@ CAMERAS: Mapping[str, np.ndarray] = {
     "front": look_at((1.35, 0.0, 1.58), TABLE_CENTRE),
     "left_shoulder": look_at((-0.175, 0.6, 1.7), TABLE_CENTRE),
 }
+SYNTHETIC_CAMERAS = (*CAMERAS, "wrist")
 # In the gripper's frame: beside the hand, looking at the tip.
 T_GRIPPER_WRIST = se3.make(se3.euler(y=0.6) @ se3.euler(z=0.3), (-0.09, 0.0, -0.09))
 

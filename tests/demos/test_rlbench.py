@@ -12,21 +12,13 @@ from imop.demos.rlbench import CAMERAS, episodes, read_episode
 from imop.errors import CorruptData, InvalidInput
 from imop.geometry.cloud import unproject
 from imop.robots.panda import tip_pose
-from tests.demos.rlbench_files import FAR, KEYFRAMES, dump_demo, frames_of, write_episode
-from tests.demos.scenes import assert_same, lift_a_cube
+from tests.demos.rlbench_files import FAR, KEYFRAMES, dump_demo, frames_of
+from tests.demos.scenes import SYNTHETIC_CAMERAS, assert_same, lift_a_cube
 from tests.demos.test_unpickle import Evil
-
-SYNTHETIC_CAMERAS = ("front", "left_shoulder", "wrist")
 
 
 def observations(demonstration):
     return [*(k.observation for k in demonstration.keyframes), demonstration.final]
-
-
-@pytest.fixture(scope="module")
-def written(tmp_path_factory):
-    root = tmp_path_factory.mktemp("data")
-    return write_episode(root / "lift" / "all_variations" / "episodes" / "episode0", lift_a_cube())
 
 
 @pytest.fixture

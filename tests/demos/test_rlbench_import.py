@@ -7,16 +7,8 @@ from imop.demos.rlbench import read_episode
 from imop.demos.rlbench_import import import_rlbench
 from imop.demos.store import DemonstrationStore
 from imop.errors import InvalidInput
-from tests.demos.rlbench_files import dump_demo, frames_of, write_episode
-from tests.demos.scenes import assert_same, lift_a_cube
-
-SYNTHETIC_CAMERAS = ("front", "left_shoulder", "wrist")
-
-
-@pytest.fixture(scope="module")
-def written(tmp_path_factory):
-    root = tmp_path_factory.mktemp("data")
-    return write_episode(root / "lift" / "all_variations" / "episodes" / "episode0", lift_a_cube())
+from tests.demos.rlbench_files import dump_demo, frames_of
+from tests.demos.scenes import SYNTHETIC_CAMERAS, assert_same, lift_a_cube
 
 
 @pytest.fixture
