@@ -7,7 +7,16 @@ from imop.networks.backbone import Backbone, BackboneConfig
 from imop.networks.blocks import relation
 from imop.networks.graph import POINT_FEATURES, Graph, Level, build_graph, collate, nearest_neighbours
 from imop.networks.matching import MatchingConfig, MatchingNetwork, dual_softmax, reposition
-from imop.networks.region import GRIPPER_FEATURES, RegionConfig, RegionNetwork, StepBatch
+from imop.networks.region import (
+    FARTHEST,
+    GRIPPER_FEATURES,
+    NEAREST,
+    NOISE,
+    RegionConfig,
+    RegionNetwork,
+    RegionPrediction,
+    StepBatch,
+)
 from tests.networks.scenes import SMALL, tabletop
 
 TINY = BackboneConfig(widths=(16, 16, 16))
@@ -99,8 +108,8 @@ def test_backbone_of_a_batch_is_that_of_its_clouds():
 def test_region_does_not_change_when_the_whole_step_is_moved():
     before, after = build_graph(tabletop(0), SMALL), build_graph(tabletop(1), SMALL)
     network = RegionNetwork(REGION)
-    here = network(step(before, after))
-    there = network(step(turned(before, YAW), turned(after, YAW), YAW @ GOAL, YAW @ NOW))
+    here = network(step(before, after)).stages
+    there = network(step(turned(before, YAW), turned(after, YAW), YAW @ GOAL, YAW @ NOW)).stages
     for a, b in zip(here, there, strict=True):
         torch.testing.assert_close(a, b, atol=1e-4, rtol=1e-3)
 
@@ -109,17 +118,26 @@ def test_region_of_a_batch_is_that_of_its_steps():
     graphs = [build_graph(tabletop(s), SMALL) for s in (0, 1, 2)]
     steps = [step(graphs[0], graphs[1]), step(graphs[2], graphs[0], NOW, GOAL)]
     network = RegionNetwork(REGION)
-    together = network(batch(steps))
+    together = network(batch(steps)).stages
     for k, stage in enumerate(together):
-        torch.testing.assert_close(stage, torch.cat([network(s)[k] for s in steps]), atol=1e-5, rtol=1e-4)
+        alone = torch.cat([network(s).stages[k] for s in steps])
+        torch.testing.assert_close(stage, alone, atol=1e-5, rtol=1e-4)
 
 
 def test_without_low_dimensional_state_the_gripper_changes_nothing():
     graph = build_graph(tabletop(), SMALL)
     for low_dimensional in (True, False):
         network = RegionNetwork(RegionConfig(REGION.backbone, low_dimensional=low_dimensional))
-        here, there = (network(step(graph, graph, T))[-1] for T in (GOAL, NOW))
+        here, there = (network(step(graph, graph, T)).stages[-1] for T in (GOAL, NOW))
         assert torch.allclose(here, there) != low_dimensional
+
+
+def test_the_more_a_point_may_differ_the_less_it_is_trusted():
+    prediction = RegionPrediction([torch.zeros(3)], torch.tensor([NEAREST, NOISE, FARTHEST]))
+    assert prediction.trust[0] > 0.9 and prediction.trust[1] == 0.5 and prediction.trust[2] < 0.05
+    graphs = [build_graph(tabletop(s), SMALL) for s in (0, 1)]
+    spread = RegionNetwork(REGION)(step(*graphs)).spread
+    assert (spread >= NEAREST).all() and (spread <= FARTHEST).all()
 
 
 def test_dual_softmax_by_hand():
@@ -157,8 +175,9 @@ def test_matching_does_not_change_when_either_scene_is_moved(attention):
     network = MatchingNetwork(MatchingConfig(TINY, attention=attention))
     # Matches are compared up to the last layer but one: a repositioning by an untrained matrix is badly
     # determined and magnifies rounding.
-    here = network(support, region, query).layers[0]
-    there = network(turned(support, YAW), region, turned(query, se3.invert(YAW))).layers[0]
+    here = network(step(support, support), region, query).layers[0]
+    moved = step(turned(support, YAW), turned(support, YAW), YAW @ GOAL, YAW @ NOW)
+    there = network(moved, region, turned(query, se3.invert(YAW))).layers[0]
     torch.testing.assert_close(here, there, atol=1e-5, rtol=1e-2)
 
 
@@ -168,9 +187,9 @@ def test_matching_of_a_batch_is_that_of_its_pairs(attention):
     regions = [torch.arange(0, 30), torch.arange(5, 50)]
     network = MatchingNetwork(MatchingConfig(TINY, attention=attention))
     joined = torch.cat([regions[0], regions[1] + len(graphs[0].points)])
-    together = network(collate(graphs[:2]), joined, collate(graphs[2:])).layers[0]
+    together = network(batch([step(g, g) for g in graphs[:2]]), joined, collate(graphs[2:])).layers[0]
     for b in range(2):
-        alone = network(graphs[b], regions[b], graphs[2 + b]).layers[0][0]
+        alone = network(step(graphs[b], graphs[b]), regions[b], graphs[2 + b]).layers[0][0]
         torch.testing.assert_close(
             together[b, : alone.shape[0], : alone.shape[1]], alone, atol=1e-5, rtol=1e-3
         )
@@ -181,9 +200,9 @@ def test_a_region_may_be_described_once_for_many_queries(attention):
     support, queries = build_graph(tabletop(0), SMALL), [build_graph(tabletop(s), SMALL) for s in (1, 2)]
     region, network = torch.arange(0, 30), MatchingNetwork(MatchingConfig(TINY, attention=attention)).eval()
     with torch.no_grad():
-        described = network.describe(support, region, network.backbone(support))
+        described = network.describe(step(support, support), region, network.backbone(support))
         for query in queries:
-            once, anew = network.match(described, query), network(support, region, query)
+            once, anew = network.match(described, query), network(step(support, support), region, query)
             torch.testing.assert_close(once.last, anew.last)
 
 
@@ -191,7 +210,7 @@ def test_a_region_may_be_described_once_for_many_queries(attention):
 def test_every_parameter_of_the_matching_network_learns(attention):
     support, query = build_graph(tabletop(0), SMALL), build_graph(tabletop(1), SMALL)
     network = MatchingNetwork(MatchingConfig(TINY, attention=attention))
-    found = network(support, torch.arange(0, 40), query)
+    found = network(step(support, support), torch.arange(0, 40), query)
     sum(layer.clamp_min(1e-6).log().mean() for layer in found.layers).backward()
     silent = [name for name, p in network.named_parameters() if p.grad is None or not p.grad.any()]
     # Before the first repositioning nothing is known about who is near whom.
@@ -204,6 +223,7 @@ def test_every_parameter_of_the_matching_network_learns(attention):
 def test_every_parameter_of_the_region_network_learns():
     graphs = [build_graph(tabletop(s), SMALL) for s in (0, 1)]
     network = RegionNetwork(REGION)
-    sum(stage.square().mean() for stage in network(step(*graphs))).backward()
+    predicted = network(step(*graphs))
+    (sum(stage.square().mean() for stage in predicted.stages) + predicted.spread.log().mean()).backward()
     silent = [name for name, p in network.named_parameters() if p.grad is None or not p.grad.any()]
     assert not silent

@@ -62,8 +62,8 @@ def networks():
     for k in range(60):
         batch = collate_samples([samples[(2 * k + i) % len(samples)] for i in range(2)])
         before = batch.step.before
-        stages = region(batch.step)
-        found = matching(before, batch.chosen, batch.query)
+        stages = region(batch.step).stages
+        found = matching(batch.step, batch.chosen, batch.query)
         loss = losses.focal(stages[-1], batch.region, before.cloud, before.size)
         loss = loss + losses.dice(stages[-1], batch.region, before.cloud, before.size)
         loss = loss + losses.matching(found.layers, batch.targets)
@@ -76,8 +76,8 @@ def networks():
 def predict(networks, batch):
     """Probability of the region (M,) and the gripper's pose in each query (B, 4, 4)."""
     with torch.no_grad():
-        inside = torch.sigmoid(networks[0](batch.step)[-1].float())
-        found = networks[1](batch.step.before, batch.chosen, batch.query)
+        inside = torch.sigmoid(networks[0](batch.step).stages[-1].float())
+        found = networks[1](batch.step, batch.chosen, batch.query)
     T = reposition(found.last, found.p_region, found.p_query)
     return inside, (T @ batch.step.T_world_goal).double().numpy()
 

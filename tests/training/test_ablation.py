@@ -39,7 +39,7 @@ ROWS = {
     "pose from matches": (Ablation(pose="from_matches"), ("region", "matching", "pose")),
     "regressed pose": (Ablation(pose="regressed"), ("pose",)),
 }
-LOSSES = {"region": {"focal", "dice"}, "matching": {"matching"}, "pose": {"pose"}}
+LOSSES = {"region": {"focal", "dice", "spread"}, "matching": {"matching"}, "pose": {"pose"}}
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,9 @@ def test_every_row_of_the_table_trains(row, shards, tmp_path):
         {name: np.mean([h[name] for h in part]) for name in history[0]}
         for part in (history[:15], history[-15:])
     )
-    assert all(last[name] < 0.8 * first[name] for name in first), (first, last)
+    # The pairs show the same things twice, which says nothing about others.
+    learned = set(first) - {"spread"}
+    assert all(last[name] < 0.8 * first[name] for name in learned), (first, last)
     model = load_model(tmp_path)
     assert model.config == shape
     assert all(0 <= value <= 1 for value in validate(model, shards, 2).values())

@@ -14,7 +14,7 @@ from imop.errors import CorruptData, InvalidInput
 from imop.geometry import se3
 from imop.networks.graph import GraphConfig
 from imop.networks.matching import MatchingConfig
-from imop.networks.model import Model, ModelConfig, load_model, save_model
+from imop.networks.model import SMALL, Model, ModelConfig, load_model, save_model
 from imop.training.data import PairDataset, loader
 from imop.training.loop import CHECKPOINT, LOG, TrainConfig, schedule, train
 from imop.training.route_shards import write_routes
@@ -87,6 +87,17 @@ def test_networks_learn_together_or_apart_and_are_resumed_bit_by_bit(shards, rou
         assert not torch.equal(value, learned[name]), name
     metrics = json.loads((tmp_path / "c" / LOG).read_text().splitlines()[-1])["validation"][routes.name]
     assert set(metrics) == {"routing", "routing_ordinary", "routing_mishaps"}
+
+
+def test_training_begins_with_given_weights(shards, tmp_path):
+    train(config(shards, tmp_path / "first", steps=2), CONFIG)
+    # The rate is too small to change anything, so that the weights are those that it began with.
+    train(config(shards, tmp_path / "next", weights=tmp_path / "first", learning_rate=1e-12), CONFIG)
+    first, after = (load_model(tmp_path / name) for name in ("first", "next"))
+    for (name, w), (_, there) in zip(first.named_parameters(), after.named_parameters(), strict=True):
+        torch.testing.assert_close(w, there, atol=1e-6, rtol=1e-5, msg=name)
+    with pytest.raises(CorruptData, match="shape"):
+        train(config(shards, tmp_path / "third", weights=tmp_path / "first"), SMALL)
 
 
 def test_a_checkpoint_gives_only_what_is_trained(shards, routes, tmp_path):

@@ -45,6 +45,27 @@ def test_dice_by_hand():
     assert found.item() == pytest.approx((first + second) / 2, rel=1e-5)
 
 
+def test_the_likeliest_spread_is_the_distance_and_unknown_points_have_no_gradient():
+    distance = torch.tensor([0.002, 0.03, math.nan])
+    expected = torch.tensor([0.002, 0.03, 0.01], requires_grad=True)
+    losses.spread(expected, distance, torch.zeros(3, dtype=torch.int64), 1).backward()
+    torch.testing.assert_close(expected.grad, torch.zeros(3))
+    for factor in (0.5, 2.0):
+        best, other = (
+            losses.spread(s, distance, torch.zeros(3, dtype=torch.int64), 1)
+            for s in (expected, factor * expected)
+        )
+        assert other > best
+
+
+def test_clouds_that_show_the_same_thing_twice_say_nothing_about_the_spread():
+    cloud, expected = torch.tensor([0, 0, 1, 1]), torch.tensor([0.01, 0.02, 0.03, 0.04])
+    both = losses.spread(expected, torch.tensor([0.004, 0.0, 0.0, 0.0]), cloud, 2)
+    alone = losses.spread(expected[:2], torch.tensor([0.004, 0.0]), cloud[:2], 1)
+    torch.testing.assert_close(both, alone)
+    assert losses.spread(expected, torch.zeros(4), cloud, 2).item() == 0
+
+
 def test_matching_by_hand():
     matrix = torch.tensor([[[0.5, 0.1], [0.2, 0.9]]])
     pairs = torch.tensor([[0, 0], [1, 1]])

@@ -99,9 +99,9 @@ def test_the_losses_of_a_batch_train_both_networks():
     optimizer = torch.optim.Adam(parameters, lr=3e-3)
     history = []
     for _ in range(30):
-        logits = region(batch.step)
+        logits = region(batch.step).stages
         cloud, size = batch.step.before.cloud, batch.step.before.size
-        found = matching(batch.step.before, batch.chosen, batch.query)
+        found = matching(batch.step, batch.chosen, batch.query)
         loss = losses.focal(logits[-1], batch.region, cloud, size)
         loss = loss + losses.dice(logits[-1], batch.region, cloud, size)
         loss = loss + losses.matching(found.layers, batch.targets)

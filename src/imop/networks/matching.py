@@ -16,6 +16,7 @@ from imop.geometry.procrustes import robust_procrustes
 from imop.networks.backbone import Backbone, BackboneConfig, level_relations
 from imop.networks.blocks import MLP, RELATION, UNIT, DenseBlock, GraphBlock, exact, gather, pad, relation
 from imop.networks.graph import Graph
+from imop.networks.region import GRIPPER_FEATURES, StepBatch
 
 # Query points per region point that a motion is fitted to.
 LIKELIEST = 3
@@ -36,6 +37,7 @@ class MatchingConfig:
         heads: of the dense attention.
         max_region: points of the region that are matched.
         region_first: False matches points of the whole support state instead of its region's.
+        low_dimensional: whether the region's points are seen from the gripper, too (the paper's ablation).
     """
 
     backbone: BackboneConfig = field(default_factory=BackboneConfig)
@@ -45,6 +47,7 @@ class MatchingConfig:
     heads: int = 4
     max_region: int = 160
     region_first: bool = True
+    low_dimensional: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +94,7 @@ class Described:
 
 
 class MatchingNetwork(nn.Module):
-    """Support state with a region, and a query state -> correspondence matrices."""
+    """Demonstrated step with a region, and a query state -> correspondence matrices."""
 
     def __init__(self, config: MatchingConfig):
         super().__init__()
@@ -99,6 +102,7 @@ class MatchingNetwork(nn.Module):
         self.backbone = Backbone(config.backbone)
         width = config.backbone.widths[0]
         groups = width // config.backbone.group_width
+        self.action = nn.Linear(GRIPPER_FEATURES, width) if config.low_dimensional else None
 
         def each(make: Callable[..., nn.Module], *arguments: int) -> nn.ModuleList:
             return nn.ModuleList(make(*arguments) for _ in range(config.layers))
@@ -116,26 +120,30 @@ class MatchingNetwork(nn.Module):
         self.project = each(nn.Linear, width, width)
         self.log_scale = nn.Parameter(torch.full((config.layers,), 1.0))
 
-    def describe(self, support: Graph, region: Tensor, features: Tensor | None = None) -> Described:
+    def describe(self, steps: StepBatch, region: Tensor, features: Tensor | None = None) -> Described:
         """All about regions that does not depend on the query; it may be kept for many queries.
 
         Args:
-            support: s_i, a batch.
-            region: (R,) indices of the region's points in `support`, cloud after cloud, at least one in each.
-            features: (M, C) `backbone(support)`, if it was computed before.
+            steps: the demonstrated steps, of which s_i' is not read.
+            region: (R,) indices of the region's points in s_i, cloud after cloud, at least one in each.
+            features: (M, C) `backbone(steps.before)`, if it was computed before.
         """
+        support = steps.before
         cloud, size = support.cloud[region], support.size
         features = self.backbone(support) if features is None else features
-        x, present = pad(gather(features, region), cloud, size)
+        described = gather(features, region)
+        if self.action is not None:
+            described = described + self.action(steps.features[region])
+        x, present = pad(described, cloud, size)
         p, _ = pad(support.points[region], cloud, size)
         n, _ = pad(support.levels[0].normals[region], cloud, size)
         own = relation(p[:, :, None], n[:, :, None], p[:, None], n[:, None])
         bias = [_masked(bias(own).permute(0, 3, 1, 2), present) for bias in self.region_bias]
         return Described(self.region_self[0](x, bias[0]), p, n, present, bias)
 
-    def forward(self, support: Graph, region: Tensor, query: Graph) -> Correspondence:
-        """Match the regions of a batch of support states to as many queries s_j; see `describe`."""
-        return self.match(self.describe(support, region), query)
+    def forward(self, steps: StepBatch, region: Tensor, query: Graph) -> Correspondence:
+        """Match the regions of a batch of steps to as many queries s_j; see `describe`."""
+        return self.match(self.describe(steps, region), query)
 
     def match(self, region: Described, query: Graph) -> Correspondence:
         """Match regions to a batch of as many queries s_j."""
@@ -232,7 +240,7 @@ def dual_softmax(scores: Tensor, rows: Tensor, columns: Tensor) -> Tensor:
     return over_columns * over_rows * (rows[:, :, None] & columns[:, None])
 
 
-def reposition(matrix: Tensor, p_x: Tensor, p_y: Tensor) -> Tensor:
+def reposition(matrix: Tensor, p_x: Tensor, p_y: Tensor, trust: Tensor | None = None) -> Tensor:
     """(B, 4, 4) motion of the region that most of the likeliest matches agree on; no gradient.
 
     Least squares as in the paper, reweighted while the reach within which matches still count shrinks: many
@@ -242,11 +250,14 @@ def reposition(matrix: Tensor, p_x: Tensor, p_y: Tensor) -> Tensor:
         matrix: (B, R, Q) confidence of each pair.
         p_x: (B, R, 3) region.
         p_y: (B, Q, 3) query.
+        trust: (B, R) how much the matches of each region point count; all the same if None.
     """
     with torch.no_grad(), exact(p_x):
         weight, best = matrix.to(p_x.dtype).topk(min(LIKELIEST, matrix.shape[2]), dim=2)
         y = torch.gather(p_y, 1, best.flatten(1)[..., None].expand(-1, -1, 3))
         x = p_x.repeat_interleave(weight.shape[2], dim=1)
+        if trust is not None:
+            weight = weight * trust[..., None].to(weight)
         return robust_procrustes(x, y, weight.flatten(1), REACHES)
 
 

@@ -1,7 +1,8 @@
-"""The invariant region network: which points of a demonstrated state is the action fixed to?
+"""The invariant region network: which points of a demonstrated state is the action fixed to, and how firmly?
 
 Paper, section III-C1: graph self attention within s_i and s_i', graph cross attention between them, a
-point-wise sigmoid over s_i after every stage.
+point-wise sigmoid over s_i after every stage. Beyond the paper it says of every point how far off its
+counterpart may be, seen from the action, if the thing is another one of its kind: Definition 1's epsilon.
 """
 
 from dataclasses import dataclass, field
@@ -10,10 +11,14 @@ import torch
 from torch import Tensor, nn
 
 from imop.networks.backbone import Backbone, BackboneConfig, level_relations
-from imop.networks.blocks import GraphBlock, relation
+from imop.networks.blocks import MLP, GraphBlock, relation
 from imop.networks.graph import POINT_FEATURES, Graph, nearest_neighbours
 
 GRIPPER_FEATURES = 16
+# Counterparts are expected within these distances, metres: the noise of the cameras, and what is no part.
+NEAREST, FARTHEST = 0.001, 0.05
+# What the cameras and the grid of the cloud leave open, metres.
+NOISE = 0.005
 
 
 @dataclass(frozen=True)
@@ -55,6 +60,11 @@ class StepBatch:
     cross: Tensor
     cross_back: Tensor
 
+    @property
+    def features(self) -> Tensor:
+        """(M, GRIPPER_FEATURES) the points of `before` in the gripper's frames; see `gripper_features`."""
+        return gripper_features(self.before, self)
+
     def to(self, device: torch.device | str) -> "StepBatch":
         """The same batch on a device."""
         rest = (self.T_world_goal, self.T_world_now, self.gripper, self.cross, self.cross_back)
@@ -82,8 +92,32 @@ def one_step(before: Graph, after: Graph, poses: Tensor, gripper: Tensor, neighb
     return StepBatch(before, after, poses[:1], poses[1:], gripper[None], *cross)
 
 
+@dataclass(frozen=True, eq=False)
+class RegionPrediction:
+    """What the region network says of the points of s_i.
+
+    Attributes:
+        stages: (M,) logits of being in the region, one per stage, the last one the best.
+        spread: (M,) metres, `NEAREST` to `FARTHEST`: how far the counterpart of a point on another thing of
+            the same kind is expected from it, both seen from the action. It means something in the region.
+    """
+
+    stages: list[Tensor]
+    spread: Tensor
+
+    @property
+    def probability(self) -> Tensor:
+        """(M,) of being in the region."""
+        return torch.sigmoid(self.stages[-1].float())
+
+    @property
+    def trust(self) -> Tensor:
+        """(M,) weights of a fit to another thing: 1 where nothing is expected to differ, else less."""
+        return 1 / (1 + (self.spread / NOISE).square())
+
+
 class RegionNetwork(nn.Module):
-    """Steps -> one logit per point of s_i and stage; the sigmoid of the last is the region."""
+    """Steps -> region and invariance of the points of s_i."""
 
     def __init__(self, config: RegionConfig):
         super().__init__()
@@ -102,9 +136,10 @@ class RegionNetwork(nn.Module):
         self.heads = nn.ModuleList(
             nn.Sequential(nn.LayerNorm(width), nn.Linear(width, 1)) for _ in range(config.stages)
         )
+        self.spread = nn.Sequential(nn.LayerNorm(width), MLP(width, width, 1))
 
-    def forward(self, steps: StepBatch) -> list[Tensor]:
-        """Logits (M,) over the points of s_i, one per stage, the last one the best."""
+    def forward(self, steps: StepBatch) -> RegionPrediction:
+        """Region and invariance of a batch of steps."""
         before, after = steps.before, steps.after
         x = self.backbone(before, self._inputs(before, steps))
         y = self.backbone(after, self._inputs(after, steps))
@@ -121,7 +156,8 @@ class RegionNetwork(nn.Module):
                 y = self.across_back[k](answering, steps.cross_back, r_back, asking)
                 y = self.within_after[k](y, after.levels[0].neighbours, r_after)
             logits.append(self.heads[k](x)[:, 0])
-        return logits
+        share = torch.sigmoid(self.spread(x)[:, 0].float())
+        return RegionPrediction(logits, NEAREST * (FARTHEST / NEAREST) ** share)
 
     def _inputs(self, graph: Graph, steps: StepBatch) -> Tensor:
         gripper = gripper_features(graph, steps)

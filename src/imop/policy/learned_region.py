@@ -39,8 +39,8 @@ class ShownRegion:
     """A region and where it comes from.
 
     Attributes:
-        graph: of the support state.
-        probability: (N,) of its points to be in the region, by the network.
+        steps: a batch of the step alone, as the networks see it.
+        probability: (N,) of the points of the support state to be in the region, by the network.
         inside: (R,) those that are, in order of their index.
         region: the same on the full cloud.
         completed: (M, 3) points of the region with the things that are mostly in it whole, metres.
@@ -48,13 +48,18 @@ class ShownRegion:
         holding: whether something is in the hand.
     """
 
-    graph: Graph
+    steps: StepBatch
     probability: Tensor
     inside: Tensor
     region: Region
     completed: FloatArray
     taken: Region | None
     holding: bool
+
+    @property
+    def graph(self) -> Graph:
+        """Of the support state."""
+        return self.steps.before
 
 
 def find_shown_regions(model: Model, steps: Sequence[Transition], threshold: float) -> list[ShownRegion]:
@@ -84,8 +89,9 @@ def _find(
     """The region of step `k`, or what is at points (M, 3) `instead` if that cannot be the region."""
     step, config = steps[k], model.config.graph
     before, after = (build_graph(s.cloud, config, s.ground) for s in (step.before, step.after))
+    batch = _batch(step, before, after, config.neighbours)
     with torch.inference_mode():
-        probability = torch.sigmoid(model.region(_batch(step, before, after, config.neighbours))[-1])
+        probability = model.region(batch).probability
     nodes = before.points.double().numpy()
     inside = _likely(probability, threshold)
     standing = ~step.before.ground.bare[nearest(nodes, step.before.cloud.points)[1][:, 0]]
@@ -102,7 +108,7 @@ def _find(
         region = _dense(step, nodes, probability.double().numpy(), inside, p_held)
     taken = _taken(step, region, contacts.taken(k, steps))
     points = _completed(step, nodes, probability, region, threshold)
-    return ShownRegion(before, probability, inside, region, points, taken, bool(contacts.holding[k]))
+    return ShownRegion(batch, probability, inside, region, points, taken, bool(contacts.holding[k]))
 
 
 def _away(step: Transition, p_gripper_held: FloatArray, points: FloatArray) -> float:

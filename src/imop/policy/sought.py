@@ -86,7 +86,7 @@ class Sought:
         few = farthest_points(shown.graph.points[inside].double().numpy(), model.config.matching.max_region)
         self._chosen = inside[torch.from_numpy(few).sort().values]
         with torch.inference_mode():
-            self._described = model.matching.describe(shown.graph, self._chosen, features)
+            self._described = model.matching.describe(shown.steps, self._chosen, features)
         self._probability = shown.probability[self._chosen].double().numpy()
         self._loose = region is not shown.region
         self.search = Search(config.search, before, region, self._loose)

@@ -35,7 +35,12 @@ class Ablation:
             InvalidInput: for less than one neighbour.
         """
         k, attention = self.neighbours, self.attention or config.matching.attention
-        matching = replace(config.matching, attention=attention, region_first=self.region_first)
+        matching = replace(
+            config.matching,
+            attention=attention,
+            region_first=self.region_first,
+            low_dimensional=self.low_dimensional,
+        )
         graph, route_graph = config.graph, config.route_graph
         if k is not None:
             if k < 1:

@@ -22,6 +22,7 @@ class TrainConfig:
         routes: folders of shards of routes to train routing on, equally often.
         validate_routes: folders of shards to validate it on, each reported by its name.
         networks: which are trained; the others stay as they are at the beginning.
+        weights: folder with the weights that training begins with; random ones if None.
         steps: optimizer steps in all.
         batch: pairs, and routes, per step and process.
         learning_rate: at its peak.
@@ -43,6 +44,7 @@ class TrainConfig:
     routes: tuple[Path, ...] = ()
     validate_routes: tuple[Path, ...] = ()
     networks: tuple[Network, ...] = ("region", "matching")
+    weights: Path | None = None
     steps: int = 20_000
     batch: int = 8
     learning_rate: float = 1e-3

@@ -24,7 +24,7 @@ from torch.optim.swa_utils import AveragedModel
 from imop.errors import CorruptData, InvalidInput
 from imop.extras import extra
 from imop.files import replaced
-from imop.networks.model import NETWORKS, Model, ModelConfig, part_of, save_model
+from imop.networks.model import NETWORKS, Model, ModelConfig, load_model, part_of, save_model
 from imop.training.config import TrainConfig
 from imop.training.data import PairDataset, RouteDataset, loader
 from imop.training.metrics import validate, validate_routes
@@ -53,6 +53,17 @@ class TrainState:
         trained = [p for name in self.networks for p in getattr(model, name).parameters()]
         self.optimizer = torch.optim.AdamW(trained, lr=config.learning_rate, weight_decay=config.weight_decay)
         self.step = 0
+
+    def begin(self, weights: Path) -> None:
+        """Take the weights in a folder, of all networks.
+
+        Raises:
+            CorruptData: if they cannot be read, or are of networks of another shape.
+        """
+        try:
+            self.model.load_state_dict(load_model(weights).state_dict())
+        except RuntimeError as error:
+            raise CorruptData(weights, f"holds networks of another shape ({error})") from error
 
     def load(self, path: Path) -> None:
         """Continue from `path` if it is there.
@@ -107,7 +118,7 @@ def train(
         The losses of every step taken.
 
     Raises:
-        CorruptData: if shards or the checkpoint cannot be read.
+        CorruptData: if shards, the first weights or the checkpoint cannot be read.
         InvalidInput: if a number is out of its range, there is nothing to train on, or the networks do not
             go together.
     """
@@ -117,6 +128,8 @@ def train(
     fabric.launch()
     torch.manual_seed(config.seed)
     state = TrainState(Model(shape), config)
+    if config.weights is not None:
+        state.begin(config.weights)
     state.load(config.out / CHECKPOINT)
     module, optimizer = fabric.setup(Objective(state.model, config.networks), state.optimizer)
     state.average.to(fabric.device)
@@ -237,6 +250,7 @@ def _card(config: TrainConfig) -> dict[str, Any]:
         "data": [folder.name for folder in (*config.train, *config.routes)],
         "shares": list(config.shares),
         "networks": list(config.networks),
+        "weights": None if config.weights is None else config.weights.name,
         "batch": config.batch,
         "seed": config.seed,
         "command": shlex.join(sys.argv),

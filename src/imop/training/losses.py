@@ -1,4 +1,4 @@
-"""Losses: focal and Dice for regions, focal on true pairs for matches, focal for routing."""
+"""Losses: focal and Dice for regions, likelihood for invariance, focal on true pairs, focal for routing."""
 
 from collections.abc import Sequence
 
@@ -43,6 +43,28 @@ def dice(logits: Tensor, target: Tensor, cloud: Tensor, size: int, smooth: float
 
     overlap = 2 * total(p * target) + smooth
     return (1 - overlap / (total(p) + total(target) + smooth)).mean()
+
+
+def spread(expected: Tensor, distance: Tensor, cloud: Tensor, size: int) -> Tensor:
+    """Negative log-likelihood of an exponential distribution, log s + d / s, mean over clouds with labels.
+
+    Args:
+        expected: (M,) s, metres.
+        distance: (M,) d, metres; NaN where it is not known. Clouds whose distances are all zero show the same
+            thing twice and say nothing about others.
+        cloud: (M,) number of each point's cloud.
+        size: number of clouds.
+    """
+    known = distance.isfinite()
+    d = torch.where(known, distance, 0.0)
+    values = torch.where(known, expected.log() + d / expected, 0.0)
+
+    def total(x: Tensor) -> Tensor:
+        return x.new_zeros(size).index_add(0, cloud, x)
+
+    count, another = total(known.to(d)), total(d) > 0
+    mean = total(values) / count.clamp_min(1)
+    return (mean * another).sum() / another.sum().clamp_min(1)
 
 
 def matching(layers: Sequence[Tensor], targets: Sequence[Sequence[Tensor]]) -> Tensor:

@@ -8,7 +8,10 @@ from torch import Tensor
 
 from imop.geometry import se3
 from imop.geometry.accuracy import COARSE, FINE
+from imop.networks.blocks import pad
+from imop.networks.matching import reposition
 from imop.networks.model import Model
+from imop.training import losses
 from imop.training.data import PairDataset, RouteDataset, loader
 from imop.training.objective import predicted_poses, right_poses
 from imop.training.pairs import PairBatch
@@ -23,7 +26,9 @@ def validate(model: Model, folder: Path, count: int) -> dict[str, float]:
     Returns:
         region_iou: intersection over union at 0.5. match: share of visible region points whose best match is
         at most 2 cm from the true one. within_2cm_10deg, within_1cm_5deg: share of pairs whose predicted
-        pose is that near to one of the right ones.
+        pose is that near to one of the right ones. firm_2cm_10deg, firm_1cm_5deg: the same of the pose by
+        least squares with the weights of the spread. spread: negative log-likelihood of the distances of
+        counterparts on other things.
     """
     dataset = PairDataset([folder], model.config, seed=0, augmented=False)
     numbers = range(min(count, len(dataset)))
@@ -70,14 +75,21 @@ def _mishaps(batch: RouteBatch) -> Tensor:
 
 def _measure(model: Model, batch: PairBatch) -> dict[str, list[float]]:
     before = batch.step.before
-    inside = model.region(batch.step)[-1] > 0
-    found = model.matching(before, batch.chosen, batch.query)
+    predicted = model.region(batch.step)
+    inside = predicted.stages[-1] > 0
+    found = model.matching(batch.step, batch.chosen, batch.query)
     T = predicted_poses(model, batch, found).double().numpy()
+    trust, _ = pad(predicted.trust[batch.chosen, None], before.cloud[batch.chosen], before.size)
+    moved = reposition(found.last, found.p_region, found.p_query, trust[..., 0])
+    T_firm = (moved @ batch.step.T_world_goal).double().numpy()
     best = found.last.argmax(dim=2)
     measured: dict[str, list[float]] = {"region_iou": [], "match": []}
     for b, motions in enumerate(batch.targets):
         here = before.cloud == b
         truth = batch.region[here] > 0.5
+        if batch.invariance[here].nansum() > 0:
+            each = predicted.spread[here], batch.invariance[here], before.cloud[here] - b
+            measured.setdefault("spread", []).append(losses.spread(*each, size=1).item())
         union = (inside[here] | truth).sum()
         measured["region_iou"].append(float((inside[here] & truth).sum() / union))
         if any(len(pairs) for pairs in motions):
@@ -89,7 +101,9 @@ def _measure(model: Model, batch: PairBatch) -> dict[str, list[float]]:
             ]
             measured["match"].append(max(float(hit.float().mean()) for hit in near))
     right = [goals.numpy() for goals in right_poses(batch)]
-    for name, distance, angle in (("within_1cm_5deg", *FINE), ("within_2cm_10deg", *COARSE)):
+    for name, distance, angle in (("1cm_5deg", *FINE), ("2cm_10deg", *COARSE)):
         limits = distance, np.radians(angle)
-        measured[name] = [float(se3.near(right[b], T[b], *limits).any()) for b in range(len(T))]
+        for kind, poses in (("within", T), ("firm", T_firm)):
+            hits = [float(se3.near(r, p, *limits).any()) for r, p in zip(right, poses, strict=True)]
+            measured[f"{kind}_{name}"] = hits
     return measured

@@ -40,17 +40,19 @@ class PairLoss(nn.Module):
         self.pose = model.pose if "pose" in networks else None
 
     def forward(self, batch: PairBatch) -> dict[str, Tensor]:
-        """Focal and Dice over all stages, matching over all layers, and the pose's."""
+        """Focal and Dice over all stages, the spread, matching over all layers, and the pose's."""
         before = batch.step.before
         parts: dict[str, Tensor] = {}
         if self.region is not None:
-            stages = self.region(batch.step)
+            predicted = self.region(batch.step)
+            stages = predicted.stages
             focal = [losses.focal(stage, batch.region, before.cloud, before.size) for stage in stages]
             dice = [losses.dice(stage, batch.region, before.cloud, before.size) for stage in stages]
             parts |= {"focal": torch.stack(focal).sum(), "dice": torch.stack(dice).sum()}
+            parts["spread"] = losses.spread(predicted.spread, batch.invariance, before.cloud, before.size)
         found = None
         if self.matching is not None:
-            found = self.matching(before, batch.chosen, batch.query)
+            found = self.matching(batch.step, batch.chosen, batch.query)
             parts["matching"] = losses.matching(found.layers, batch.targets)
         if self.pose is not None:
             right = [goals.to(before.points.device) for goals in right_poses(batch)]
