@@ -55,7 +55,9 @@ def generate(
     full = ROUTE_SHARD if routes else SHARD
     sizes = [min(full, count - start) for start in range(0, count, full)]
     Parallel(n_jobs=jobs)(
-        delayed(_shard)(out / f"shard-{i:05d}.npz", size, _content(seed, i, held_out), families, routes, mix, kinds)
+        delayed(_shard)(
+            out / f"shard-{i:05d}.npz", size, _content(seed, i, held_out), families, routes, mix, kinds
+        )
         for i, size in enumerate(sizes)
     )
 

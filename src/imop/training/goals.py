@@ -44,9 +44,7 @@ def _loosely(rng: np.random.Generator) -> float:
     return float(rng.uniform(*_ABOUT)) if rng.random() < 0.5 else 0.0
 
 
-def _kept_at(
-    stage: Stage, held: int, target: int, rng: np.random.Generator
-) -> tuple[FloatArray, FloatArray]:
+def _kept_at(stage: Stage, held: int, target: int, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """T_target_held (4, 4) at a goal on or beside the target, and the direction (3,) from which it comes."""
     other, tool = stage.things[target], stage.things[held].tool
     up, style, yaw = np.array([0.0, 0.0, 1.0]), rng.random(), rng.choice((-1, -0.5, 0, 0.5)) * np.pi
@@ -103,7 +101,9 @@ def shove(stage: Stage, thing: int, goal: int, rng: np.random.Generator) -> Reci
     bottom = stage.bottom(thing)
     low = bottom + min(0.02, 0.5 * (stage.top(thing) - bottom))
     T_thing_way = se3.make(se3.euler(z=angle))
-    T = T_thing_way @ from_above((-behind, middle[1], low), rng.choice((0.0, 0.5)) * np.pi + rng.normal(0, 0.2))
+    T = T_thing_way @ from_above(
+        (-behind, middle[1], low), rng.choice((0.0, 0.5)) * np.pi + rng.normal(0, 0.2)
+    )
     T_goal_thing = T_goal_end @ se3.make(p=(-ahead, -middle[1], -bottom)) @ se3.invert(T_thing_way)
     away = T_thing_way @ se3.make(p=(-rng.uniform(0.02, 0.05), 0, 0)) @ se3.invert(T_thing_way) @ T
     steps = [Step(thing, "body", se3.make(p=(0, 0, 0.08)) @ away, False, 0.0)]

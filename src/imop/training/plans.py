@@ -104,14 +104,14 @@ class _Cast:
             self.draws.pop()
         raise Unreachable(f"no family has {wanted}")
 
-    def distract(self, number: int) -> None:
-        """Add things that resemble one."""
+    def distract(self, number: int, equal: bool) -> None:
+        """Add things that resemble one, some of them `equal` to it."""
         name, shape, color, _ = self.draws[number]
         if self.rng.random() < 0.4:
             self.add(name, shape=shape)
         if self.rng.random() < 0.25:
             self.add(None if self.rng.random() < 0.5 else name, color=color)
-        if self.rng.random() < 0.2:
+        if self.rng.random() < 0.2 and equal:
             self.add(name, shape, color)
 
 
@@ -155,9 +155,10 @@ def draw_plan(
     for _ in range(int(rng.choice(1 + np.arange(len(parts_odds)), p=parts_odds))):
         parts.append(_part(cast, str(rng.choice(list(SHARES), p=odds / odds.sum()))))
     acting = len(cast.things)
-    unique = {part[2] for part in parts if part[0] == "shove"}
-    for number in sorted(set(range(acting)) - unique):
-        cast.distract(number)
+    # What is beside it tells to which of equal goals something is pushed, but nothing of the goal itself.
+    unique = {part[-1] for part in parts if part[0] in ("shove", "row")}
+    for number in range(acting):
+        cast.distract(number, number not in unique)
     for _ in range(int(rng.integers(1, 4))):
         cast.add()
     for items in (cast.things, cast.draws):

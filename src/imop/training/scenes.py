@@ -215,17 +215,17 @@ def _before(
 def _lies(
     stage: Stage, thing: int, lying: steps.Lying, placed: list[FloatArray], rng: np.random.Generator
 ) -> FloatArray:
-    """T_below_thing (4, 4) anywhere on a floor beside what is `placed` there: points (N, 2) in that body."""
+    """T_below_thing (4, 4) anywhere on a floor, beside what is `placed` there: cells (N, 2) of that body."""
     floor = stage.things[lying.below].floors[lying.floor]
-    for _ in range(40):
+    for _ in range(15):
         R = se3.euler(z=rng.uniform(-np.pi, np.pi))
         xy, depth = stage.footprint(thing, R)
         low, high = -np.array(floor.half) - xy.min(axis=0), np.array(floor.half) - xy.max(axis=0)
         if (low > high).any():
             continue
         T = floor.T_body_floor @ se3.make(R, (*rng.uniform(low, high), depth))
-        taken = se3.apply(T, np.column_stack([xy @ R[:2, :2], np.zeros(len(xy))]))[:, :2]
-        if all(np.linalg.norm(taken[:, None] - other, axis=2).min() > _CELL for other in placed):
+        taken = np.unique(np.round((xy + T[:2, 3]) / _CELL), axis=0)
+        if all(np.abs(taken[:, None] - other).max(axis=2).min() > 1 for other in placed):
             placed.append(taken)
             return T
     raise Unreachable("no room on the floor")

@@ -199,9 +199,7 @@ def let_go(target: int, goal: FloatArray, closed: float, rng: np.random.Generato
     return [Step(target, "body", goal, False, closed), opened] if rng.random() < _APART else [opened]
 
 
-def on_spot(
-    stage: Stage, held: int, target: int, rng: np.random.Generator, hole: bool = False
-) -> FloatArray:
+def on_spot(stage: Stage, held: int, target: int, rng: np.random.Generator, hole: bool = False) -> FloatArray:
     """T_target_held (4, 4) on one of its spots, or in one of its holes, turned at random or not at all."""
     spots = stage.things[target].holes if hole else stage.things[target].spots
     spot = spots[int(rng.integers(len(spots)))]

@@ -25,7 +25,9 @@ def dock(shape: np.random.Generator, color: np.random.Generator) -> Thing:
     return Thing(spec, keeps=keeps)
 
 
-def _under(shape: np.random.Generator, color: np.random.Generator, spec: Any, body: Any) -> tuple[FloatArray, ...]:
+def _under(
+    shape: np.random.Generator, color: np.random.Generator, spec: Any, body: Any
+) -> tuple[FloatArray, ...]:
     x, y, z = shape.uniform(0.05, 0.1), shape.uniform(0.06, 0.12), shape.uniform(0.06, 0.14)
     board, legs, t = paint(color), paint(color), shape.uniform(0.006, 0.015)
     box(body, (-x, -y, z - t), (x, y, z), board, WOOD)
@@ -36,7 +38,9 @@ def _under(shape: np.random.Generator, color: np.random.Generator, spec: Any, bo
     return (up(x + shape.uniform(0.0, 0.03), 0, 0.012), up(x, shape.uniform(-0.5, 0.5) * y, 0.012))
 
 
-def _garage(shape: np.random.Generator, color: np.random.Generator, spec: Any, body: Any) -> tuple[FloatArray, ...]:
+def _garage(
+    shape: np.random.Generator, color: np.random.Generator, spec: Any, body: Any
+) -> tuple[FloatArray, ...]:
     x, y, z, w = shape.uniform(0.04, 0.08), shape.uniform(0.035, 0.07), shape.uniform(0.03, 0.08), 0.008
     first, back = paint(color), paint(color)
     for side in _SIDES:
@@ -46,7 +50,9 @@ def _garage(shape: np.random.Generator, color: np.random.Generator, spec: Any, b
     return (up(shape.uniform(0.0, 0.8) * x, 0, 0.01), up(x + 0.02, 0, 0.5 * z))
 
 
-def _cradle(shape: np.random.Generator, color: np.random.Generator, spec: Any, body: Any) -> tuple[FloatArray, ...]:
+def _cradle(
+    shape: np.random.Generator, color: np.random.Generator, spec: Any, body: Any
+) -> tuple[FloatArray, ...]:
     x, y, z = shape.uniform(0.04, 0.07), shape.uniform(0.04, 0.08), shape.uniform(0.02, 0.05)
     first, second = paint(color), paint(color)
     box(body, (-x, -y, 0), (x, y, z), first, PLASTIC)
@@ -56,7 +62,9 @@ def _cradle(shape: np.random.Generator, color: np.random.Generator, spec: Any, b
     return (up(0.2 * x, 0, z + 0.003), up(0.3 * x, shape.uniform(-0.4, 0.4) * y, z + 0.02))
 
 
-def _slot(shape: np.random.Generator, color: np.random.Generator, spec: Any, body: Any) -> tuple[FloatArray, ...]:
+def _slot(
+    shape: np.random.Generator, color: np.random.Generator, spec: Any, body: Any
+) -> tuple[FloatArray, ...]:
     t, y, z = shape.uniform(0.01, 0.04), shape.uniform(0.05, 0.1), shape.uniform(0.1, 0.22)
     at, high = shape.uniform(-0.5, 0.5) * y, shape.uniform(0.45, 0.8) * z
     wide, tall = shape.uniform(0.004, 0.02), shape.uniform(0.004, 0.025)
@@ -64,7 +72,13 @@ def _slot(shape: np.random.Generator, color: np.random.Generator, spec: Any, bod
     _wall_with_hole(body, (t, y, z), (at, high, wide, tall), color_)
     box(body, (-t - 0.03, -y, 0), (t + 0.03, y, 0.012), color_, WOOD)
     if shape.random() < 0.6:
-        box(body, (t, at - 2.5 * wide, high + tall), (t + 0.003, at + 2.5 * wide, high + tall + 0.02), plate, METAL)
+        box(
+            body,
+            (t, at - 2.5 * wide, high + tall),
+            (t + 0.003, at + 2.5 * wide, high + tall + 0.02),
+            plate,
+            METAL,
+        )
     far = shape.uniform(0.0, 0.03)
     return (up(t + far, at, high - tall),)
 
@@ -82,7 +96,9 @@ def _wall_with_hole(
     box(body, (-t, at - wide, high + tall), (t, at + wide, z), color, WOOD)
 
 
-def _eye(shape: np.random.Generator, color: np.random.Generator, spec: Any, body: Any) -> tuple[FloatArray, ...]:
+def _eye(
+    shape: np.random.Generator, color: np.random.Generator, spec: Any, body: Any
+) -> tuple[FloatArray, ...]:
     r, high = shape.uniform(0.02, 0.04), shape.uniform(0.06, 0.15)
     foot, ring = paint(color), paint(color)
     out = r + shape.uniform(0.02, 0.04)

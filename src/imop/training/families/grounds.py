@@ -135,7 +135,9 @@ def _collar(
 ) -> None:
     """A flat ring around a hole."""
     inner = body.add_body(name=name, pos=list(p))
-    lathe.shell(spec, inner, name, [(radius + 0.006, 0.0), (radius + 0.006, 0.004)], 0.006, color, PLASTIC, 16)
+    lathe.shell(
+        spec, inner, name, [(radius + 0.006, 0.0), (radius + 0.006, 0.004)], 0.006, color, PLASTIC, 16
+    )
 
 
 def sunken(shape: np.random.Generator, color: np.random.Generator) -> Thing:
@@ -154,7 +156,9 @@ def sunken(shape: np.random.Generator, color: np.random.Generator) -> Thing:
     half = shape.uniform(0.012, 0.03)
     tab = (end[0], end[1], (low + high) / 2)
     flap = body.add_body(name="tab", pos=list(tab), quat=se3.to_wxyz(se3.make(se3.euler(z=angle))))
-    box(flap, (0, -half, -(high - low) / 2), (shape.uniform(0.02, 0.06), half, (high - low) / 2), second, WOOD)
+    box(
+        flap, (0, -half, -(high - low) / 2), (shape.uniform(0.02, 0.06), half, (high - low) / 2), second, WOOD
+    )
     bottom = up(z=max(low, 0.003))
     return Thing(spec, spots=(bottom,), holes=(bottom, bottom @ _over(high)), symmetry=np.eye(4)[None])
 

@@ -52,7 +52,13 @@ def berth(shape: np.random.Generator, color: np.random.Generator) -> Thing:
         end = shape.uniform(-0.01, 0.03)
     elif style < 0.8:
         box(body, (x, -y, 0), (x + 2 * w, y, z), first, WOOD)
-        box(body, (x + 2 * w, -0.4 * y, 0), (x + 2 * w + x, 0.4 * y, z * shape.uniform(0.3, 1.0)), second, WOOD)
+        box(
+            body,
+            (x + 2 * w, -0.4 * y, 0),
+            (x + 2 * w + x, 0.4 * y, z * shape.uniform(0.3, 1.0)),
+            second,
+            WOOD,
+        )
     else:
         box(body, (x, -y, 0), (x + w, y, z), first, WOOD)
         side = float(shape.choice((-1.0, 1.0)))
@@ -63,5 +69,3 @@ def berth(shape: np.random.Generator, color: np.random.Generator) -> Thing:
 
 def _ahead(x: float) -> FloatArray:
     return up(x, 0, 0)
-
-

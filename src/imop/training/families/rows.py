@@ -63,7 +63,9 @@ def _end(shape: np.random.Generator, plate: Any, x: float, y: float, color: Colo
 Place = tuple[float, float, float]
 
 
-def _dial(body: Any, name: str, p: Place, r: float, ways: tuple[float, float], tones: tuple[Color, Color]) -> Moving:
+def _dial(
+    body: Any, name: str, p: Place, r: float, ways: tuple[float, float], tones: tuple[Color, Color]
+) -> Moving:
     dial = inner(body, name, np.eye(3), p)
     hinge(dial, name, (0, 0, -1), (0.0, 3.0))
     cylinder(dial, r, 0, 0.012, tones[0], METAL)
@@ -72,14 +74,18 @@ def _dial(body: Any, name: str, p: Place, r: float, ways: tuple[float, float], t
     return Moving(name, (0.0, ways[0]), Hold(se3.make(_DOWN, (0, 0, 0.02)), name, 0.008))
 
 
-def _button(body: Any, name: str, p: Place, r: float, ways: tuple[float, float], tones: tuple[Color, Color]) -> Moving:
+def _button(
+    body: Any, name: str, p: Place, r: float, ways: tuple[float, float], tones: tuple[Color, Color]
+) -> Moving:
     cap = inner(body, name, np.eye(3), (p[0], p[1], ways[1]))
     slide(cap, name, (0, 0, -1), 0.9 * ways[1])
     cylinder(cap, r, -ways[1], 0, tones[0], PLASTIC)
     return Moving(name, (0.0, 0.7 * ways[1]), Hold(se3.make(_DOWN), name, 0.0), push=True)
 
 
-def _toggle(body: Any, name: str, p: Place, r: float, ways: tuple[float, float], tones: tuple[Color, Color]) -> Moving:
+def _toggle(
+    body: Any, name: str, p: Place, r: float, ways: tuple[float, float], tones: tuple[Color, Color]
+) -> Moving:
     arm = inner(body, name, np.eye(3), p)
     hinge(arm, name, (0, 1, 0), (-0.9, 0.9))
     long = 0.03 + ways[1]
@@ -89,7 +95,9 @@ def _toggle(body: Any, name: str, p: Place, r: float, ways: tuple[float, float],
     return Moving(name, (-half, half), Hold(se3.make(_DOWN, (0, 0, long)), name, r))
 
 
-def _slider(body: Any, name: str, p: Place, r: float, ways: tuple[float, float], tones: tuple[Color, Color]) -> Moving:
+def _slider(
+    body: Any, name: str, p: Place, r: float, ways: tuple[float, float], tones: tuple[Color, Color]
+) -> Moving:
     box(body, (-0.035, p[1] - 0.003, 0), (0.035, p[1] + 0.003, 0.0008), tones[1], PLASTIC)
     knob = inner(body, name, np.eye(3), (-0.025, p[1], 0.0))
     slide(knob, name, (1, 0, 0), 0.05)
@@ -98,17 +106,23 @@ def _slider(body: Any, name: str, p: Place, r: float, ways: tuple[float, float],
     return Moving(name, (0.0, min(0.048, 0.03 * (0.5 + ways[0]))), hold)
 
 
-def _key(body: Any, name: str, p: Place, r: float, ways: tuple[float, float], tones: tuple[Color, Color]) -> Moving:
+def _key(
+    body: Any, name: str, p: Place, r: float, ways: tuple[float, float], tones: tuple[Color, Color]
+) -> Moving:
     key = inner(body, name, np.eye(3), (-0.03, p[1], 0.012))
     hinge(key, name, (0, 1, 0), (0.0, 0.4))
     box(key, (0, -1.2 * r, -0.004), (0.08, 1.2 * r, 0.006), tones[0], PLASTIC)
     return Moving(name, (0.0, 0.12), Hold(se3.make(_DOWN, (0.068, 0, 0.006)), name, 0.0), push=True)
 
 
-def _plug(body: Any, name: str, p: Place, r: float, ways: tuple[float, float], tones: tuple[Color, Color]) -> Moving:
+def _plug(
+    body: Any, name: str, p: Place, r: float, ways: tuple[float, float], tones: tuple[Color, Color]
+) -> Moving:
     plug = inner(body, name, np.eye(3), p)
     kind = mujoco.mjtJoint.mjJNT_SLIDE
-    plug.add_joint(name=name, type=kind, axis=[0, 0, 1], range=[0, 0.08], limited=mujoco.mjtLimited.mjLIMITED_TRUE)
+    plug.add_joint(
+        name=name, type=kind, axis=[0, 0, 1], range=[0, 0.08], limited=mujoco.mjtLimited.mjLIMITED_TRUE
+    )
     cylinder(plug, 0.7 * r, -0.01, 0.02 + ways[1], tones[0], PLASTIC)
     cylinder(plug, r, 0.02 + ways[1], 0.028 + ways[1], tones[1], PLASTIC)
     return Moving(name, (0.0, 0.05), Hold(se3.make(_DOWN, (0, 0, 0.024 + ways[1])), name, 2 * r))
@@ -144,7 +158,13 @@ def stack(shape: np.random.Generator, color: np.random.Generator) -> Thing:
         name = f"tray{k}"
         tray = inner(body, name, UPRIGHT, (deep, 0, foot + (k + 0.5) * pitch))
         slide(tray, name, (0, 0, 1), 0.08)
-        box(tray, (0.002 - pitch / 2, 0.003 - y, -2 * deep * 0.8), (pitch / 2 - 0.002, y - 0.003, 0), front, WOOD)
+        box(
+            tray,
+            (0.002 - pitch / 2, 0.003 - y, -2 * deep * 0.8),
+            (pitch / 2 - 0.002, y - 0.003, 0),
+            front,
+            WOOD,
+        )
         a = (0.0, at - half, out) if not upright else (-0.35 * pitch, at, out)
         b = (0.0, at + half, out) if not upright else (0.35 * pitch, at, out)
         capsule(tray, a, b, 0.005, pull, METAL)

@@ -132,7 +132,9 @@ def drum(shape: np.random.Generator, color: np.random.Generator) -> Thing:
     knob = 0.007
     capsule(body, (0.65 * flat, 0, z), (0.65 * flat, 0, z + rim + 0.018), knob, second, PLASTIC)
     grip = Hold(from_above((0.65 * flat, 0, z + rim + 0.016)), width=2 * knob)
-    return Thing(spec, (grip,), pokes=(Hold(from_above((0.65 * flat, 0, z + rim + 0.025)), width=0.0),), sided=True)
+    return Thing(
+        spec, (grip,), pokes=(Hold(from_above((0.65 * flat, 0, z + rim + 0.025)), width=0.0),), sided=True
+    )
 
 
 def casket(shape: np.random.Generator, color: np.random.Generator) -> Thing:
