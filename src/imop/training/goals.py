@@ -1,5 +1,7 @@
 """Pseudo-steps whose goal is what matters: something is kept at it, pushed to it, or was in a box before."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from imop.geometry import se3
@@ -13,7 +15,7 @@ _ABOUT = (0.01, 0.04)
 
 
 def keep(stage: Stage, held: int, target: int, rng: np.random.Generator) -> Recipe:
-    """Take a thing, bring it to another one and keep it in the hand: inserted, pushed under, turned towards."""
+    """Take a thing, bring it to another one and keep it in the hand: inserted, pushed under, turned to it."""
     thing = stage.things[held]
     hold = pick(rng, thing.holds)
     R = thing.rests[int(rng.integers(len(thing.rests)))]
@@ -111,6 +113,9 @@ def shove(stage: Stage, thing: int, goal: int, rng: np.random.Generator) -> Reci
         steps.append(Step(thing, "body", away, False, 0.0))
     if rng.random() < 0.6:
         steps.append(Step(thing, "body", T, False, 0.0))
+    if len(stage.things[thing].symmetry) > 1:
+        # Only the goal tells on which of its equal sides it is touched: no pair of the thing alone can.
+        steps = [replace(step, loose=0.001) for step in steps]
     arrived = T_goal_thing @ T
     if rng.random() < 0.35:
         halfway = se3.make(p=(*(-rng.uniform(0.03, 0.06) * way), 0)) @ arrived
@@ -124,7 +129,7 @@ def shove(stage: Stage, thing: int, goal: int, rng: np.random.Generator) -> Reci
 
 
 def _end(stage: Stage, goal: int, rng: np.random.Generator) -> FloatArray:
-    """T_goal_end (4, 4), z up at the table's height, +x along the push; a side of what has no goal of its own."""
+    """T_goal_end (4, 4) on the table, +x along the push: a goal of the thing, or any side if it has none."""
     goals, angle = stage.things[goal].goals, rng.uniform(-np.pi, np.pi)
     if goals:
         return goals[int(rng.integers(len(goals)))]

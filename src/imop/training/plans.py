@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from imop.extras import extra
-
 from imop.training.families.redraw import redrawn
 from imop.training.families.thing import Family, Floor, Thing
 from imop.training.stage import Unreachable
@@ -178,7 +177,10 @@ def _part(cast: _Cast, kind: str) -> Part:
         floors = cast.things[below].floors
         held = cast.where("holds", partial(_small, floors=floors))
         target = cast.where("spots")
-        others = [cast.where("holds", partial(_small, floors=floors)) for _ in range(int(rng.integers(3)))]
+        count = int(rng.integers(3))
+        others: tuple[int, ...] = tuple(
+            cast.where("holds", partial(_small, floors=floors)) for _ in range(count)
+        )
         return kind, held, below, target, *others
     if kind == "shove":
         pushed = cast.where("holds", _low)
@@ -222,7 +224,7 @@ def _one_way(thing: Thing) -> bool:
 def _low(thing: Thing) -> bool:
     """Whether it is pushed rather than toppled."""
     x, y, z = _extent(thing)
-    return min(x, y) > 0.025 and max(x, y) < 0.16 and z < 2.5 * min(x, y)
+    return bool(min(x, y) > 0.025 and max(x, y) < 0.16 and z < 2.5 * min(x, y))
 
 
 def _slim(thing: Thing) -> bool:

@@ -223,7 +223,7 @@ def _lies(
         low, high = -np.array(floor.half) - xy.min(axis=0), np.array(floor.half) - xy.max(axis=0)
         if (low > high).any():
             continue
-        T = floor.T_body_floor @ se3.make(R, (*rng.uniform(low, high), depth))
+        T = se3.make(R, floor.middle + np.array([*rng.uniform(low, high), depth]))
         taken = np.unique(np.round((xy + T[:2, 3]) / _CELL), axis=0)
         if all(np.abs(taken[:, None] - other).max(axis=2).min() > 1 for other in placed):
             placed.append(taken)

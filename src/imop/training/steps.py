@@ -34,8 +34,8 @@ class Step:
         carry: the thing that moves with the gripper during the motion although it is not held, or None.
         joint: (name, position) of the thing after the motion.
         loose: the demonstrator goes only about there, up to so many metres off; no pair shows such a step.
-        T_reached_recorded: (4, 4) the recorded pose in the frame of the gripper as it is seen afterwards: where
-            commands are recorded, they are a little off.
+        T_reached_recorded: (4, 4) the recorded pose in the frame of the gripper as it is seen afterwards:
+            commands, where they are what is recorded, are a little off.
     """
 
     thing: int
@@ -167,7 +167,7 @@ def carry(
     below: int | None = None,
     into_hole: bool = False,
 ) -> Recipe:
-    """Take a thing and put it on a spot of another, or into a hole; it may lie on a spot of a third one before."""
+    """Take a thing, perhaps from a spot of a third one, and put it on a spot of another, or into a hole."""
     thing = stage.things[held]
     hold = pick(rng, thing.holds)
     R = thing.rests[0] if below is not None else thing.rests[int(rng.integers(len(thing.rests)))]

@@ -48,7 +48,7 @@ def take(scene: Scene, rng: np.random.Generator) -> Take:
 
 
 def make_pair(scene: Scene, support: Take, query: Take, step: int) -> StepPair | None:
-    """The pair of a step in two takes; None if it is loose, or one of them sees too little of what matters."""
+    """The pair of a step in two takes; None if it is loose or too little of what matters is seen."""
     if scene.recipe.steps[step].loose:
         return None
     before, now = support.poses[step], query.poses[step]

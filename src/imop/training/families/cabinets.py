@@ -36,7 +36,7 @@ def drawers(shape: np.random.Generator, color: np.random.Generator) -> Thing:
         Moving(f"drawer{k}", (0.0, sizes.travel), Hold(from_front((0, 0, 0), down), f"drawer{k}", 0.012))
         for k in range(count)
     )
-    floors = (Floor(up(z=sizes.height), (sizes.depth / 2, sizes.width / 2)),)
+    floors = (Floor((0, 0, sizes.height), (sizes.depth / 2, sizes.width / 2)),)
     return Thing(spec, spots=(up(z=sizes.height),), moving=moving, floors=floors)
 
 

@@ -1,5 +1,6 @@
 """Grounds for other things: boxes, tables and boards on which things lie anywhere, and boards with holes."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -23,10 +24,10 @@ def container(shape: np.random.Generator, color: np.random.Generator) -> Thing:
         r = (x + y) / 2
         cylinder(body, r, 0, wall, first, PLASTIC)
         lathe.shell(spec, body, "rim", [(r, wall), (r * 1.08, 0.6 * z)], wall, second, PLASTIC, 20)
-        inside = Floor(up(z=wall), (0.66 * r, 0.66 * r))
+        inside = Floor((0, 0, wall), (0.66 * r, 0.66 * r))
         return Thing(spec, spots=(up(z=wall),), floors=(inside,), symmetry=revolution())
     walls(body, (x, y, z), wall, first, second)
-    floors, symmetry = (Floor(up(z=wall), (x - wall, y - wall)),), HALF_TURN
+    floors, symmetry = (Floor((0, 0, wall), (x - wall, y - wall)),), HALF_TURN
     if style < 0.5:
         out = shape.uniform(0.005, 0.02)
         box(body, (x, -y - 0.01, 0), (x + out, y + 0.01, z + 0.01), paint(color), WOOD)
@@ -36,7 +37,7 @@ def container(shape: np.random.Generator, color: np.random.Generator) -> Thing:
         at = shape.uniform(0.1, 0.35) * x
         box(body, (at, wall - y, wall), (at + wall, y - wall, 0.8 * z), second, WOOD)
         half = (at + x - wall) / 2
-        floors = (Floor(up(at - half, 0, wall), (half, y - wall)),)
+        floors = (Floor((at - half, 0, wall), (half, y - wall)),)
         symmetry = np.eye(4)[None]
     grips = (Hold(from_above((0, y - wall / 2, z - 0.012)), width=wall),)
     return Thing(spec, grips, spots=(up(z=wall),), floors=floors, symmetry=symmetry)
@@ -76,7 +77,7 @@ def bench(shape: np.random.Generator, color: np.random.Generator) -> Thing:
         piece.moved(se3.make(p=at)).add(spec, body, f"piece{k}", paint(color))
         edge = max(edge, 2 * min(deep, 0.6 * x))
     room = max(0.07, x - edge / 2)
-    return Thing(spec, spots=(up(room - x, 0, high),), floors=(Floor(up(room - x, 0, high), (room, y)),))
+    return Thing(spec, spots=(up(room - x, 0, high),), floors=(Floor((room - x, 0, high), (room, y)),))
 
 
 def pierced(shape: np.random.Generator, color: np.random.Generator) -> Thing:
@@ -89,7 +90,7 @@ def pierced(shape: np.random.Generator, color: np.random.Generator) -> Thing:
     edges = np.linspace(-x, x, count + 1)
     through, lower = bool(shape.random() < 0.5), shape.uniform(0.1, 0.6) * thick
     holes = []
-    for k, (a, b) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+    for k, (a, b) in enumerate(pairwise(edges)):
         wide = (b - a) * shape.uniform(0.35, 0.7) / 2
         deep = min(y * 0.7, wide * shape.uniform(0.6, 2.0))
         cx = (a + b) / 2 + shape.uniform(-0.5, 0.5) * ((b - a) / 2 - wide)
@@ -141,7 +142,7 @@ def _collar(
 
 
 def sunken(shape: np.random.Generator, color: np.random.Generator) -> Thing:
-    """A round or cornered board with one round hole off its middle, as a stove, an egg rack or a cup holder."""
+    """A round or cornered board with one round hole off its middle, as a stove or a cup holder."""
     spec, body = part(fixed=True)
     r, hole = shape.uniform(0.07, 0.11), shape.uniform(0.02, 0.04)
     low, high = shape.uniform(0.0, 0.02), shape.uniform(0.025, 0.05)

@@ -40,7 +40,7 @@ def row(shape: np.random.Generator, color: np.random.Generator) -> Thing:
 
 
 def _case(body: Any, x: float, y: float, z: float, lean: float, color: Color) -> Any:
-    """A box whose upper side leans to the front (+x); returns a body in the middle of that side, z outwards."""
+    """A box whose upper side leans to the front (+x); returns a body in its middle, z outwards."""
     high = z + x * np.sin(lean)
     box(body, (-x, -y, 0), (x * np.cos(lean), y, max(0.006, z - 0.01)), color, WOOD)
     plate = inner(body, "plate", se3.euler(y=lean), (0.0, 0.0, high))
@@ -176,6 +176,6 @@ def stack(shape: np.random.Generator, color: np.random.Generator) -> Thing:
 
 
 def _ahead(upright: bool) -> FloatArray:
-    """T_front_gripper (4, 4) against a front's z, closing across the bar: along y if it is upright, else x."""
+    """T_front_gripper (4, 4) against the z of a front, closing across an upright bar or a level one."""
     R = np.diag([-1.0, 1.0, -1.0])
     return se3.make(R if upright else R @ se3.euler(z=np.pi / 2))

@@ -66,7 +66,7 @@ def tray(shape: np.random.Generator, color: np.random.Generator) -> Thing:
         box(body, (wall - x, a, wall), (x - wall, b, z), sides, WOOD)
     grips = (Hold(from_above((0, y - wall / 2, z - 0.012)), width=wall),)
     spots = (up(z=wall), up(x / 2, 0, wall), up(-x / 2, 0, wall))
-    floors = (Floor(up(z=wall), (x - wall, y - wall)),)
+    floors = (Floor((0, 0, wall), (x - wall, y - wall)),)
     return Thing(spec, grips, spots=spots, symmetry=HALF_TURN, floors=floors)
 
 

@@ -51,11 +51,11 @@ class Floor:
     """A level surface of a thing on which another one may lie anywhere.
 
     Attributes:
-        T_body_floor: (4, 4) its middle, z up.
-        half: half sizes along its x and y, metres.
+        middle: (3,) metres in the body's frame.
+        half: half sizes along the body's x and y, metres.
     """
 
-    T_body_floor: FloatArray
+    middle: tuple[float, float, float]
     half: tuple[float, float]
 
 
