@@ -15,7 +15,7 @@ from imop.training.viewpoints import placed_cameras
 
 KINDS = ("keep", "unpack", "shove", "sink", "row", "side")
 CAMERAS = placed_cameras(np.random.default_rng(0))
-SCENES = 2
+SCENES = 1
 
 
 class Twice:
@@ -24,9 +24,9 @@ class Twice:
     def __init__(self, families, kind, rng):
         self.part = None
         while self.part is None:
-            plan = draw_plan(families, rng, (1.0,), (kind,))
-            self.scene = build(plan, CAMERAS, rng)
             try:
+                plan = draw_plan(families, rng, (1.0,), (kind,))
+                self.scene = build(plan, CAMERAS, rng)
                 self.states = [demonstrate(self.scene, rng) for _ in range(2)]
                 self.part = plan.parts[0]
             except Unreachable:

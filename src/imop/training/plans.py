@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence, Sized
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +17,9 @@ with extra("sim"):
     import mujoco
 
 MOST_THINGS = 8
-_PATIENCE = 200
+_PATIENCE = 60
 """So many things are drawn at most to find one that can play a part."""
+_PROBES = 4
 
 
 class Draw(NamedTuple):
@@ -94,8 +95,9 @@ class _Cast:
         Raises:
             Unreachable: if none was found.
         """
-        for _ in range(_PATIENCE):
-            number = self.add()
+        able = [name for name, family in self.families.items() if _offers(family, wanted)]
+        for _ in range(_PATIENCE if able else 0):
+            number = self.add(str(self.rng.choice(able)))
             offered = getattr(self.things[number], wanted)
             if _some(offered) and fits(self.things[number]):
                 return number
@@ -112,6 +114,13 @@ class _Cast:
             self.add(None if self.rng.random() < 0.5 else name, color=color)
         if self.rng.random() < 0.2 and equal:
             self.add(name, shape, color)
+
+
+@cache
+def _offers(family: Family, wanted: str) -> bool:
+    """Whether any of a few things of a family has some of an attribute."""
+    seeds = (np.random.default_rng(seed) for seed in range(_PROBES))
+    return any(_some(getattr(family(rng, rng), wanted)) for rng in seeds)
 
 
 def _some(offered: object) -> bool:
