@@ -81,7 +81,10 @@ def pairs_across(
 
 
 def _outline(scene: Scene) -> list[tuple[object, ...]]:
-    return [(s.thing, s.link, s.gripper_open, s.take, s.carry, s.loose > 0) for s in scene.recipe.steps]
+    return [
+        (s.thing, s.link, s.gripper_open, s.take, s.carry and s.carry[0], s.loose > 0)
+        for s in scene.recipe.steps
+    ]
 
 
 def _instance(scene: Scene, rng: np.random.Generator) -> _Instance:

@@ -109,19 +109,20 @@ def shove(stage: Stage, thing: int, goal: int, rng: np.random.Generator) -> Reci
     T_goal_thing = T_goal_end @ se3.make(p=(-ahead, -middle[1], -bottom)) @ se3.invert(T_thing_way)
     away = T_thing_way @ se3.make(p=(-rng.uniform(0.02, 0.05), 0, 0)) @ se3.invert(T_thing_way) @ T
     steps = [Step(thing, "body", se3.make(p=(0, 0, 0.08)) @ away, False, 0.0)]
-    if rng.random() < 0.6:
+    style = rng.random()
+    if style < 0.7:
         steps.append(Step(thing, "body", away, False, 0.0))
-    if rng.random() < 0.6:
+    if style > 0.4:
         steps.append(Step(thing, "body", T, False, 0.0))
     if len(stage.things[thing].symmetry) > 1:
         # Only the goal tells on which of its equal sides it is touched: no pair of the thing alone can.
         steps = [replace(step, loose=0.001) for step in steps]
-    arrived = T_goal_thing @ T
+    arrived, T_gripper_thing = T_goal_thing @ T, se3.invert(T)
     if rng.random() < 0.35:
         halfway = se3.make(p=(*(-rng.uniform(0.03, 0.06) * way), 0)) @ arrived
         loose = _loosely(rng) / 2
-        steps.append(Step(goal, "body", halfway, False, 0.0, carry=thing, loose=loose))
-    steps.append(Step(goal, "body", arrived, False, 0.0, carry=thing))
+        steps.append(Step(goal, "body", halfway, False, 0.0, carry=(thing, T_gripper_thing), loose=loose))
+    steps.append(Step(goal, "body", arrived, False, 0.0, carry=(thing, T_gripper_thing)))
     if rng.random() < 0.3:
         steps.append(Step(goal, "body", back(arrived, rng.uniform(0.05, 0.1)), False, 0.0))
     rests = {thing: np.eye(3), goal: np.eye(3)}

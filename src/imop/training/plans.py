@@ -116,11 +116,14 @@ class _Cast:
             self.add(name, shape, color)
 
 
-@cache
 def _offers(family: Family, wanted: str) -> bool:
     """Whether any of a few things of a family has some of an attribute."""
-    seeds = (np.random.default_rng(seed) for seed in range(_PROBES))
-    return any(_some(getattr(family(rng, rng), wanted)) for rng in seeds)
+    return any(_some(getattr(thing, wanted)) for thing in _probes(family))
+
+
+@cache
+def _probes(family: Family) -> tuple[Thing, ...]:
+    return tuple(family(rng, rng) for rng in map(np.random.default_rng, range(_PROBES)))
 
 
 def _some(offered: object) -> bool:
@@ -190,7 +193,8 @@ def _part(cast: _Cast, kind: str) -> Part:
         others: tuple[int, ...] = tuple(
             cast.where("holds", partial(_small, floors=floors)) for _ in range(count)
         )
-        return kind, held, below, target, *others
+        things: tuple[int, ...] = (held, below, target, *others)
+        return (kind, *things)
     if kind == "shove":
         pushed = cast.where("holds", _low)
         goal = cast.where("goals") if rng.random() < 0.7 else cast.where("symmetry", _one_way)

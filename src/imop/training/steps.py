@@ -31,7 +31,8 @@ class Step:
         gripper_open: after the motion.
         opening: of the gripper then, 0 .. 1.
         take: the thing is in the hand from then on.
-        carry: the thing that moves with the gripper during the motion although it is not held, or None.
+        carry: a thing that is pushed along though it is not held, and where it is then in the gripper's frame
+            (4, 4); or None.
         joint: (name, position) of the thing after the motion.
         loose: the demonstrator goes only about there, up to so many metres off; no pair shows such a step.
         T_reached_recorded: (4, 4) the recorded pose in the frame of the gripper as it is seen afterwards:
@@ -44,7 +45,7 @@ class Step:
     gripper_open: bool
     opening: float
     take: bool = False
-    carry: int | None = None
+    carry: tuple[int, FloatArray] | None = None
     joint: tuple[str, float] | None = None
     loose: float = 0.0
     T_reached_recorded: FloatArray = field(default_factory=lambda: np.eye(4))
@@ -53,7 +54,10 @@ class Step:
         """The step as one demonstration does it: a loose one goes somewhere near."""
         if not self.loose:
             return self
-        off = se3.make(se3.euler(*rng.normal(0, 2 * self.loose, 3)), rng.uniform(-self.loose, self.loose, 3))
+        turn, shift = rng.normal(0, 2 * self.loose, 3), rng.uniform(-self.loose, self.loose, 3)
+        if self.carry is not None:
+            turn, shift = turn * (0, 0, 1), shift * (1, 1, 0)
+        off = se3.make(se3.euler(*turn), shift)
         return replace(self, T_link_goal=self.T_link_goal @ off)
 
 
@@ -129,7 +133,12 @@ def perform(stage: Stage, state: State, step: Step) -> State:
     goal = stage.link_poses(state)[step.thing, step.link] @ step.T_link_goal
     if se3.apply(goal, _HAND)[:, 2].min() < TABLE_HEIGHT:
         raise Unreachable("the hand would dip into the table")
-    moved = (state if step.carry is None else replace(state, held=step.carry)).reached(goal)
+    moved = state.reached(goal)
+    if step.carry is not None:
+        thing, T_gripper_thing = step.carry
+        poses = moved.poses.copy()
+        poses[thing] = goal @ T_gripper_thing
+        moved = replace(moved, poses=poses)
     joints = dict(state.joints)
     if step.joint is not None:
         joints[step.thing, step.joint[0]] = step.joint[1]
@@ -289,5 +298,5 @@ def push(stage: Stage, thing: int, rng: np.random.Generator) -> Recipe:
         steps.append(Step(thing, "body", before, False, 0.0))
     steps.append(Step(thing, "body", T, False, 0.0))
     goal = se3.make(p=rng.uniform(0.04, 0.12) * way) @ T
-    steps.append(Step(thing, "body", goal, False, 0.0, carry=thing))
+    steps.append(Step(thing, "body", goal, False, 0.0, carry=(thing, se3.invert(T))))
     return Recipe(tuple(steps), {thing: np.eye(3)}, {}, {})
