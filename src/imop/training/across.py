@@ -1,6 +1,6 @@
 """Pairs of a step on one thing and the same step on another of its kind."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -54,14 +54,17 @@ class _Instance:
 
 
 def pairs_across(
-    families: Mapping[str, Family], variation: Variation, rng: np.random.Generator
+    families: Mapping[str, Family],
+    variation: Variation,
+    rng: np.random.Generator,
+    kinds: Sequence[str] = (),
 ) -> list[StepPair]:
-    """The pairs of one scene, whose things are others in the query.
+    """The pairs of one scene, whose things are others in the query; of some kinds of what is done, or all.
 
     Raises:
         Unreachable: if what was drawn cannot be done, or has no other things.
     """
-    *plans, changed = other_instances(draw_plan(families, rng), families, variation, rng)
+    *plans, changed = other_instances(draw_plan(families, rng, kinds=kinds), families, variation, rng)
     cameras, how = placed_cameras(rng.spawn(1)[0]), int(rng.integers(2**32))
     scenes = [build(plan, cameras, np.random.default_rng(how)) for plan in plans]
     if _outline(scenes[0]) != _outline(scenes[1]):
@@ -69,6 +72,8 @@ def pairs_across(
     one, other = (_instance(scene, rng) for scene in scenes)
     found = []
     for step in range(len(scenes[0].recipe.steps)):
+        if scenes[0].recipe.steps[step].loose:
+            continue
         concerned = {scenes[0].recipe.steps[step].thing, one.take.states[step].held}
         if concerned & changed:
             found += [_pair(a, b, step, variation != "color") for a, b in ((one, other), (other, one))]
@@ -76,7 +81,10 @@ def pairs_across(
 
 
 def _outline(scene: Scene) -> list[tuple[object, ...]]:
-    return [(s.thing, s.link, s.gripper_open, s.take, s.carry) for s in scene.recipe.steps]
+    return [
+        (s.thing, s.link, s.gripper_open, s.take, s.carry and s.carry[0], s.loose > 0)
+        for s in scene.recipe.steps
+    ]
 
 
 def _instance(scene: Scene, rng: np.random.Generator) -> _Instance:

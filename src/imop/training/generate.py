@@ -10,6 +10,7 @@ from joblib import Parallel, delayed
 from imop.errors import CorruptData, InvalidInput
 from imop.training.families import HELD_OUT, TRAINING, Family
 from imop.training.instances import VARIATIONS, shares
+from imop.training.plans import SHARES
 from imop.training.route_shards import RouteShard, write_routes
 from imop.training.routes import synthetic_routes
 from imop.training.shards import Shard, write_shard
@@ -28,6 +29,7 @@ def generate(
     routes: bool = False,
     names: Sequence[str] = (),
     mix: Sequence[float] = SAME_ONLY,
+    kinds: Sequence[str] = (),
 ) -> None:
     """Write `count` pairs, or routes, to numbered shards in `out`; whole shards that are there stay.
 
@@ -40,17 +42,22 @@ def generate(
         routes: whether examples for the routing network instead of pairs.
         names: of the families that the scenes are made of; none for all.
         mix: of pairs, as in `synthetic_pairs`.
+        kinds: of what is done in pairs (`plans.SHARES`); none for all.
 
     Raises:
-        InvalidInput: if there is no such family, or the mix is not four shares.
+        InvalidInput: if there is no such family or kind, or the mix is not four shares.
     """
     families = chosen(names, held_out)
+    if unknown := sorted(set(kinds) - set(SHARES)):
+        raise InvalidInput("kinds", f"no {', '.join(unknown)}", ", ".join(SHARES))
     shares(mix)
     out.mkdir(parents=True, exist_ok=True)
     full = ROUTE_SHARD if routes else SHARD
     sizes = [min(full, count - start) for start in range(0, count, full)]
     Parallel(n_jobs=jobs)(
-        delayed(_shard)(out / f"shard-{i:05d}.npz", size, _content(seed, i, held_out), families, routes, mix)
+        delayed(_shard)(
+            out / f"shard-{i:05d}.npz", size, _content(seed, i, held_out), families, routes, mix, kinds
+        )
         for i, size in enumerate(sizes)
     )
 
@@ -73,14 +80,20 @@ def _content(seed: int, number: int, held_out: bool) -> int:
 
 
 def _shard(
-    path: Path, size: int, content: int, families: dict[str, Family], routes: bool, mix: Sequence[float]
+    path: Path,
+    size: int,
+    content: int,
+    families: dict[str, Family],
+    routes: bool,
+    mix: Sequence[float],
+    kinds: Sequence[str],
 ) -> None:
     if _whole(path, size, routes):
         return
     if routes:
         write_routes(list(synthetic_routes(content, size, families)), path)
     else:
-        write_shard(list(synthetic_pairs(content, size, families, mix)), path)
+        write_shard(list(synthetic_pairs(content, size, families, mix, kinds)), path)
     print(f"{path}: {size} {'routes' if routes else 'pairs'}", flush=True)
 
 
@@ -105,6 +118,9 @@ def main() -> None:
     parser.add_argument("--held-out", action="store_true", help="families for testing only")
     parser.add_argument("--families", nargs="+", default=(), metavar="NAME", help="only these; default: all")
     parser.add_argument(
+        "--kinds", nargs="+", default=(), metavar="KIND", help="only pairs of these: " + ", ".join(SHARES)
+    )
+    parser.add_argument(
         "--mix",
         nargs=len(VARIATIONS),
         type=float,
@@ -115,7 +131,9 @@ def main() -> None:
     args = parser.parse_args()
     routes = args.routes is not None
     count = args.routes if routes else args.pairs
-    generate(args.out, count, args.seed, args.jobs, args.held_out, routes, args.families, args.mix)
+    generate(
+        args.out, count, args.seed, args.jobs, args.held_out, routes, args.families, args.mix, args.kinds
+    )
 
 
 if __name__ == "__main__":

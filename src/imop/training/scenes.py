@@ -1,14 +1,14 @@
 """Scenes of procedural things, with something to do in them, demonstrated several times."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from imop.geometry import se3
 from imop.robots.panda import PANDA_HOME_Q
 from imop.sim.cameras import Camera
-from imop.training import steps
+from imop.training import goals, steps
 from imop.training.families.thing import Family
 from imop.training.plans import Part, Plan, draw_plan
 from imop.training.stage import Stage, State, Unreachable, above_table
@@ -20,6 +20,8 @@ _LOWER, _UPPER, _CELL = np.array((-0.16, -0.48)), np.array((0.62, 0.48)), 0.012
 _AREA = ((-0.02, 0.46), (-0.38, 0.38))
 _AWAY = se3.make(p=(3.0, 0.0, -5.0))
 _TRIES = 12
+_COMMANDED = 0.5
+"""How often the recorded action is what was commanded, not what was reached."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,31 +48,50 @@ def build(plan: Plan, cameras: Mapping[str, Camera], rng: np.random.Generator) -
     recipe = recipes[0]
     for other in recipes[1:]:
         recipe = recipe.then(other)
+    if rng.random() < _COMMANDED:
+        recipe = replace(recipe, steps=tuple(_commanded(step, rng) for step in recipe.steps))
     kinds = tuple(plan.draws.index(draw) for draw in plan.draws)
     return Scene(stage, kinds, recipe, tuple(draw.family for draw in plan.draws))
 
 
 def draw_scene(
-    families: Mapping[str, Family], rng: np.random.Generator, parts_odds: tuple[float, ...] = (0.65, 0.35)
+    families: Mapping[str, Family],
+    rng: np.random.Generator,
+    parts_odds: tuple[float, ...] = (0.65, 0.35),
+    kinds: Sequence[str] = (),
 ) -> Scene:
     """A scene of what `draw_plan` draws.
 
     Raises:
         Unreachable: if no family can play a part that was drawn.
     """
-    plan = draw_plan(families, rng, parts_odds)
+    plan = draw_plan(families, rng, parts_odds, kinds)
     return build(plan, placed_cameras(rng.spawn(1)[0]), rng)
 
 
+def _commanded(step: steps.Step, rng: np.random.Generator) -> steps.Step:
+    """The step with a recorded pose that the gripper missed by up to some millimetres."""
+    off = se3.make(se3.euler(*rng.normal(0, 0.012, 3)), rng.normal(0, 0.002, 3))
+    return replace(step, T_reached_recorded=off)
+
+
 def _recipe(stage: Stage, part: Part, rng: np.random.Generator) -> Recipe:
-    kind, first, second, below = part
-    if kind == "carry":
-        return steps.carry(stage, first, second, rng, None if below < 0 else below)
+    kind, *numbers = part
+    first, second, third = (*numbers, -1, -1)[:3]
+    if kind in ("carry", "sink"):
+        below = None if third < 0 else third
+        return steps.carry(stage, first, second, rng, below, into_hole=kind == "sink")
     if kind == "use":
         return steps.use(stage, first, second, rng)
-    if kind == "operate":
+    if kind in ("operate", "row"):
         moving = stage.things[first].moving
         return steps.operate(stage, first, moving[int(rng.integers(len(moving)))], rng)
+    if kind == "keep":
+        return goals.keep(stage, first, second, rng)
+    if kind == "unpack":
+        return goals.unpack(stage, first, second, third, tuple(numbers[3:]), rng)
+    if kind == "shove":
+        return goals.shove(stage, first, second, rng)
     return steps.press(stage, first, rng) if kind == "press" else steps.push(stage, first, rng)
 
 
@@ -84,7 +105,7 @@ def demonstrate(scene: Scene, rng: np.random.Generator) -> list[State]:
         try:
             states = [_arrange(scene, rng)]
             for step in scene.recipe.steps:
-                states.append(steps.perform(scene.stage, states[-1], step))
+                states.append(steps.perform(scene.stage, states[-1], step.drawn(rng)))
         except Unreachable:
             continue
         return states
@@ -96,8 +117,13 @@ def _arrange(scene: Scene, rng: np.random.Generator) -> State:
     free = np.ones(np.ceil((_UPPER - _LOWER) / _CELL).astype(int), dtype=bool)
     poses = np.stack([_AWAY] * len(stage.things))
     needed = set(recipe.rests) | {below for below, _ in recipe.resting_on.values()}
-    for i in sorted(range(len(stage.things)), key=lambda i: i not in needed):
-        if i in recipe.resting_on:
+    elsewhere = {*recipe.resting_on, *recipe.lying, *recipe.before}
+    needed |= {before.goal for before in recipe.before.values()}
+    order = sorted(range(len(stage.things)), key=lambda i: (i not in needed, i in recipe.before))
+    for i in order:
+        if i in recipe.before:
+            poses[i] = _before(stage, i, recipe.before[i], poses, free, rng)
+        if i in elsewhere:
             continue
         if i in needed or rng.random() < 0.9:
             R = recipe.rests.get(i, np.eye(3))
@@ -106,6 +132,9 @@ def _arrange(scene: Scene, rng: np.random.Generator) -> State:
                 raise Unreachable("no free place on the table")
     for i, (below, T_below_thing) in recipe.resting_on.items():
         poses[i] = poses[below] @ T_below_thing
+    placed: list[FloatArray] = []
+    for i, lying in recipe.lying.items():
+        poses[i] = poses[lying.below] @ _lies(stage, i, lying, placed, rng)
     joints = {}
     for i, thing in enumerate(stage.things):
         for moving in thing.moving:
@@ -138,14 +167,65 @@ def _place(stage: Stage, thing: int, R: FloatArray, free: BoolArray, rng: np.ran
     for _ in range(30):
         yaw = rng.uniform(np.pi - 1.2, np.pi + 1.2) if facing else rng.uniform(-np.pi, np.pi)
         turned = se3.euler(z=yaw) @ R
-        xy, depth = stage.footprint(thing, turned)
         at = np.array([rng.uniform(*side) for side in _AREA])
-        cells = np.floor((xy + at - _LOWER) / _CELL).astype(int)
-        if (cells < 1).any() or (cells >= np.array(free.shape) - 1).any():
-            continue
-        if free[cells[:, 0], cells[:, 1]].all():
-            for dx in (-1, 0, 1):
-                for dy in (-1, 0, 1):
-                    free[cells[:, 0] + dx, cells[:, 1] + dy] = False
-            return above_table(turned, float(at[0]), float(at[1]), depth)
+        if _claimed(stage, thing, turned, at, free):
+            return above_table(turned, float(at[0]), float(at[1]), stage.footprint(thing, turned)[1])
     return _AWAY
+
+
+def _claimed(stage: Stage, thing: int, R: FloatArray, at: FloatArray, free: BoolArray) -> bool:
+    """Whether the thing, turned by `R` (3, 3), has free ground at `at` (2,), which it then takes."""
+    xy, _ = stage.footprint(thing, R)
+    cells = np.floor((xy + at - _LOWER) / _CELL).astype(int)
+    if (cells < 1).any() or (cells >= np.array(free.shape) - 1).any():
+        return False
+    if not free[cells[:, 0], cells[:, 1]].all():
+        return False
+    for dx in (-1, 0, 1):
+        for dy in (-1, 0, 1):
+            free[cells[:, 0] + dx, cells[:, 1] + dy] = False
+    return True
+
+
+def _before(
+    stage: Stage,
+    thing: int,
+    before: steps.Before,
+    poses: FloatArray,
+    free: BoolArray,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """A pose on free ground somewhere before the thing's goal, turned and shifted a little."""
+    T_world_end = poses[before.goal] @ before.T_goal_thing
+    way = poses[before.goal][:2, :2] @ before.way
+    for _ in range(40):
+        far = rng.uniform(0.07, 0.3)
+        aside = rng.uniform(-0.35, 0.35) * far
+        at = T_world_end[:2, 3] - far * way + aside * np.array([-way[1], way[0]])
+        turned = se3.euler(z=rng.uniform(-0.6, 0.6)) @ T_world_end[:3, :3]
+        if (
+            _AREA[0][0] < at[0] < _AREA[0][1]
+            and _AREA[1][0] < at[1] < _AREA[1][1]
+            and _claimed(stage, thing, turned, at, free)
+        ):
+            return above_table(turned, float(at[0]), float(at[1]), stage.footprint(thing, turned)[1])
+    raise Unreachable("no free place before the goal")
+
+
+def _lies(
+    stage: Stage, thing: int, lying: steps.Lying, placed: list[FloatArray], rng: np.random.Generator
+) -> FloatArray:
+    """T_below_thing (4, 4) anywhere on a floor, beside what is `placed` there: cells (N, 2) of that body."""
+    floor = stage.things[lying.below].floors[lying.floor]
+    for _ in range(15):
+        R = se3.euler(z=rng.uniform(-np.pi, np.pi))
+        xy, depth = stage.footprint(thing, R)
+        low, high = -np.array(floor.half) - xy.min(axis=0), np.array(floor.half) - xy.max(axis=0)
+        if (low > high).any():
+            continue
+        T = se3.make(R, floor.middle + np.array([*rng.uniform(low, high), depth]))
+        taken = np.unique(np.round((xy + T[:2, 3]) / _CELL), axis=0)
+        if all(np.abs(taken[:, None] - other).max(axis=2).min() > 1 for other in placed):
+            placed.append(taken)
+            return T
+    raise Unreachable("no room on the floor")

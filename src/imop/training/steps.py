@@ -1,6 +1,6 @@
 """Pseudo-steps: what a demonstrator would do with a thing, as gripper poses fixed to a link of it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,7 +17,8 @@ _HAND = np.array(
     ]
 )
 """Corners of the hand in the gripper's frame: they may not dip into the table."""
-_MARGIN = 0.06
+_APART = 0.35
+"""How often the fingers open in a keyframe of their own, after the arrival."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +31,12 @@ class Step:
         gripper_open: after the motion.
         opening: of the gripper then, 0 .. 1.
         take: the thing is in the hand from then on.
-        carry: the thing moves with the gripper during the motion.
+        carry: a thing that is pushed along though it is not held, and where it is then in the gripper's frame
+            (4, 4); or None.
         joint: (name, position) of the thing after the motion.
+        loose: the demonstrator goes only about there, up to so many metres off; no pair shows such a step.
+        T_reached_recorded: (4, 4) the recorded pose in the frame of the gripper as it is seen afterwards:
+            commands, where they are what is recorded, are a little off.
     """
 
     thing: int
@@ -40,8 +45,48 @@ class Step:
     gripper_open: bool
     opening: float
     take: bool = False
-    carry: bool = False
+    carry: tuple[int, FloatArray] | None = None
     joint: tuple[str, float] | None = None
+    loose: float = 0.0
+    T_reached_recorded: FloatArray = field(default_factory=lambda: np.eye(4))
+
+    def drawn(self, rng: np.random.Generator) -> "Step":
+        """The step as one demonstration does it: a loose one goes somewhere near."""
+        if not self.loose:
+            return self
+        turn, shift = rng.normal(0, 2 * self.loose, 3), rng.uniform(-self.loose, self.loose, 3)
+        if self.carry is not None:
+            turn, shift = turn * (0, 0, 1), shift * (1, 1, 0)
+        off = se3.make(se3.euler(*turn), shift)
+        return replace(self, T_link_goal=self.T_link_goal @ off)
+
+
+@dataclass(frozen=True)
+class Lying:
+    """A thing lies anywhere on a floor of another one, elsewhere in every scene.
+
+    Attributes:
+        below: that one.
+        floor: number of the floor.
+    """
+
+    below: int
+    floor: int
+
+
+@dataclass(frozen=True, eq=False)
+class Before:
+    """A thing lies before a goal, somewhere on the way to it.
+
+    Attributes:
+        goal: the thing at whose side it ends.
+        T_goal_thing: (4, 4) where it ends if it is not turned on the way.
+        way: (2,) along which it goes there, unit vector in the goal's frame.
+    """
+
+    goal: int
+    T_goal_thing: FloatArray
+    way: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +99,8 @@ class Recipe:
         joints: (thing, joint) -> position.
         resting_on: thing -> (thing below, T_below_thing), for what does not stand on the table.
         starts: numbers of the steps with which something new begins, whatever the gripper did before.
+        lying: thing -> where it lies at random, for what lies in or on another thing.
+        before: thing -> the goal before which it lies.
     """
 
     steps: tuple[Step, ...]
@@ -61,6 +108,8 @@ class Recipe:
     joints: dict[tuple[int, str], float]
     resting_on: dict[int, tuple[int, FloatArray]]
     starts: tuple[int, ...] = (0,)
+    lying: dict[int, Lying] = field(default_factory=dict)
+    before: dict[int, Before] = field(default_factory=dict)
 
     def then(self, other: "Recipe") -> "Recipe":
         """Both, one after the other."""
@@ -70,6 +119,8 @@ class Recipe:
             other.joints | self.joints,
             other.resting_on | self.resting_on,
             self.starts + tuple(len(self.steps) + start for start in other.starts),
+            other.lying | self.lying,
+            other.before | self.before,
         )
 
 
@@ -82,7 +133,12 @@ def perform(stage: Stage, state: State, step: Step) -> State:
     goal = stage.link_poses(state)[step.thing, step.link] @ step.T_link_goal
     if se3.apply(goal, _HAND)[:, 2].min() < TABLE_HEIGHT:
         raise Unreachable("the hand would dip into the table")
-    moved = (replace(state, held=step.thing) if step.carry else state).reached(goal)
+    moved = state.reached(goal)
+    if step.carry is not None:
+        thing, T_gripper_thing = step.carry
+        poses = moved.poses.copy()
+        poses[thing] = goal @ T_gripper_thing
+        moved = replace(moved, poses=poses)
     joints = dict(state.joints)
     if step.joint is not None:
         joints[step.thing, step.joint[0]] = step.joint[1]
@@ -90,55 +146,71 @@ def perform(stage: Stage, state: State, step: Step) -> State:
     return replace(moved, joints=joints, held=held, gripper_open=step.gripper_open, opening=step.opening)
 
 
-def _back(T: FloatArray, distance: float) -> FloatArray:
+def back(T: FloatArray, distance: float) -> FloatArray:
+    """A gripper pose (4, 4) `distance` metres before one, against its approach."""
     return T @ se3.make(p=(0, 0, -distance))
 
 
-def _pick(rng: np.random.Generator, items: tuple[Hold, ...]) -> Hold:
+def pick(rng: np.random.Generator, items: tuple[Hold, ...]) -> Hold:
+    """Any one."""
     return items[int(rng.integers(len(items)))]
 
 
-def _raised(R: FloatArray, T_body_gripper: FloatArray, way: FloatArray) -> FloatArray:
+def raised(R: FloatArray, T_body_gripper: FloatArray, way: FloatArray) -> FloatArray:
     """T_body_gripper after a move by `way` (3,) of a table on which the body lies turned by `R`."""
     return se3.make(p=R.T @ way) @ T_body_gripper
 
 
-def _taken(stage: Stage, thing: int, hold: Hold, rng: np.random.Generator) -> list[Step]:
+def taken(stage: Stage, thing: int, hold: Hold, rng: np.random.Generator) -> list[Step]:
     """Approach, close."""
     T, width = hold.T_link_gripper, opening_for(hold.width)
-    steps = [Step(thing, hold.link, _back(T, rng.uniform(0.05, 0.12)), True, 1.0)]
+    steps = [Step(thing, hold.link, back(T, rng.uniform(0.05, 0.12)), True, 1.0)]
     return [*steps, Step(thing, hold.link, T, False, width, take=hold.link == "body")]
 
 
-def carry(stage: Stage, held: int, target: int, rng: np.random.Generator, below: int | None = None) -> Recipe:
-    """Take a thing and put it on a spot of another; it may lie on a spot of a third one before."""
-    thing, other = stage.things[held], stage.things[target]
-    hold = _pick(rng, thing.holds)
+def carry(
+    stage: Stage,
+    held: int,
+    target: int,
+    rng: np.random.Generator,
+    below: int | None = None,
+    into_hole: bool = False,
+) -> Recipe:
+    """Take a thing, perhaps from a spot of a third one, and put it on a spot of another, or into a hole."""
+    thing = stage.things[held]
+    hold = pick(rng, thing.holds)
     R = thing.rests[0] if below is not None else thing.rests[int(rng.integers(len(thing.rests)))]
     resting = {}
     if below is not None:
-        resting[held] = (below, _on_spot(stage, held, below, rng))
-    steps = _taken(stage, held, hold, rng)
+        resting[held] = (below, on_spot(stage, held, below, rng))
+    steps = taken(stage, held, hold, rng)
     T, closed = hold.T_link_gripper, opening_for(hold.width)
     lift = np.array([*rng.uniform(-0.03, 0.03, 2), rng.uniform(0.06, 0.2)])
     if rng.random() < 0.75:
-        steps.append(Step(held, "body", _raised(R, T, lift), False, closed))
-    placed = _on_spot(stage, held, target, rng)
+        steps.append(Step(held, "body", raised(R, T, lift), False, closed))
+    placed = on_spot(stage, held, target, rng, into_hole)
     if rng.random() < 0.25:
-        placed = se3.make(p=(*rng.uniform(-0.08, 0.08, 2), rng.uniform(0, 0.1))) @ placed
+        aside = rng.uniform(-0.08, 0.08, 2) * (not into_hole)
+        placed = se3.make(p=(*aside, rng.uniform(0, 0.1))) @ placed
     goal = placed @ T
     above = se3.make(p=(0, 0, rng.uniform(0.04, 0.12))) @ goal
-    if rng.random() < 0.7 or not len(other.spots):
+    if rng.random() < 0.7:
         steps.append(Step(target, "body", above, False, closed))
-    steps.append(Step(target, "body", goal, True, 1.0))
+    steps += let_go(target, goal, closed, rng)
     if rng.random() < 0.4:
-        steps.append(Step(target, "body", _back(goal, rng.uniform(0.05, 0.12)), True, 1.0))
+        steps.append(Step(target, "body", back(goal, rng.uniform(0.05, 0.12)), True, 1.0))
     return Recipe(tuple(steps), {held: R, target: np.eye(3)}, {}, resting)
 
 
-def _on_spot(stage: Stage, held: int, target: int, rng: np.random.Generator) -> FloatArray:
-    """T_target_held (4, 4) on one of its spots, turned at random or not at all."""
-    spots = stage.things[target].spots
+def let_go(target: int, goal: FloatArray, closed: float, rng: np.random.Generator) -> list[Step]:
+    """Arrive at T_target_gripper `goal` (4, 4) and open, in one keyframe or in two."""
+    opened = Step(target, "body", goal, True, 1.0)
+    return [Step(target, "body", goal, False, closed), opened] if rng.random() < _APART else [opened]
+
+
+def on_spot(stage: Stage, held: int, target: int, rng: np.random.Generator, hole: bool = False) -> FloatArray:
+    """T_target_held (4, 4) on one of its spots, or in one of its holes, turned at random or not at all."""
+    spots = stage.things[target].holes if hole else stage.things[target].spots
     spot = spots[int(rng.integers(len(spots)))]
     yaw = rng.uniform(-np.pi, np.pi) if rng.random() < 0.4 else rng.choice((0, 0.5, 1, 1.5)) * np.pi
     return spot @ se3.make(se3.euler(z=yaw)) @ se3.invert(stage.mount(held))
@@ -148,12 +220,12 @@ def use(stage: Stage, tool: int, target: int, rng: np.random.Generator) -> Recip
     """Take a tool, bring its working end to another thing, and make a stroke."""
     thing = stage.things[tool]
     assert thing.tool is not None
-    hold = _pick(rng, thing.holds)
+    hold = pick(rng, thing.holds)
     R = thing.rests[int(rng.integers(len(thing.rests)))]
-    steps = _taken(stage, tool, hold, rng)
+    steps = taken(stage, tool, hold, rng)
     T, closed = hold.T_link_gripper, opening_for(hold.width)
     lift = np.array([*rng.uniform(-0.03, 0.03, 2), rng.uniform(0.08, 0.25)])
-    steps.append(Step(tool, "body", _raised(R, T, lift), False, closed))
+    steps.append(Step(tool, "body", raised(R, T, lift), False, closed))
     xy, _ = stage.footprint(target, np.eye(3))
     top = stage.top(target)
     beside = rng.random() < 0.5
@@ -182,7 +254,7 @@ def operate(stage: Stage, thing: int, moving: Moving, rng: np.random.Generator) 
     before, after = (stage.link_in_body(thing, moving.joint, p) for p in (start, end))
     T = hold.T_link_gripper
     open_, width = (False, 0.0) if moving.push else (True, 1.0)
-    steps = [Step(thing, hold.link, _back(T, rng.uniform(0.04, 0.12)), open_, width)]
+    steps = [Step(thing, hold.link, back(T, rng.uniform(0.04, 0.12)), open_, width)]
     if moving.push:
         if rng.random() < 0.3:
             steps.append(Step(thing, hold.link, T, False, 0.0))
@@ -193,7 +265,7 @@ def operate(stage: Stage, thing: int, moving: Moving, rng: np.random.Generator) 
     opening = 1.0 if let_go else opening_for(hold.width)
     steps.append(Step(thing, hold.link, goal, let_go, opening, joint=(moving.joint, end)))
     if let_go or (moving.push and rng.random() < 0.5):
-        steps.append(Step(thing, hold.link, _back(T, rng.uniform(0.05, 0.1)), let_go, opening))
+        steps.append(Step(thing, hold.link, back(T, rng.uniform(0.05, 0.1)), let_go, opening))
     joints = {(thing, moving.joint): start}
     return Recipe(tuple(steps), {thing: np.eye(3)}, joints, {})
 
@@ -202,10 +274,10 @@ def press(stage: Stage, thing: int, rng: np.random.Generator) -> Recipe:
     """Touch a thing with closed fingers."""
     pokes = stage.things[thing].pokes
     if pokes:
-        T = _pick(rng, pokes).T_link_gripper
+        T = pick(rng, pokes).T_link_gripper
     else:
         T = from_above((0, 0, stage.top(thing)), rng.uniform(-np.pi, np.pi), rng.uniform(-0.3, 0.3))
-    steps = [Step(thing, "body", _back(T, rng.uniform(0.04, 0.12)), False, 0.0)]
+    steps = [Step(thing, "body", back(T, rng.uniform(0.04, 0.12)), False, 0.0)]
     steps.append(Step(thing, "body", T, False, 0.0))
     return Recipe(tuple(steps), {thing: np.eye(3)}, {}, {})
 
@@ -226,5 +298,5 @@ def push(stage: Stage, thing: int, rng: np.random.Generator) -> Recipe:
         steps.append(Step(thing, "body", before, False, 0.0))
     steps.append(Step(thing, "body", T, False, 0.0))
     goal = se3.make(p=rng.uniform(0.04, 0.12) * way) @ T
-    steps.append(Step(thing, "body", goal, False, 0.0, carry=True))
+    steps.append(Step(thing, "body", goal, False, 0.0, carry=(thing, se3.invert(T))))
     return Recipe(tuple(steps), {thing: np.eye(3)}, {}, {})

@@ -23,7 +23,11 @@ SAME_ONLY = (1.0, 0.0, 0.0, 0.0)
 
 
 def synthetic_pairs(
-    seed: int, count: int, families: Mapping[str, Family], mix: Sequence[float] = SAME_ONLY
+    seed: int,
+    count: int,
+    families: Mapping[str, Family],
+    mix: Sequence[float] = SAME_ONLY,
+    kinds: Sequence[str] = (),
 ) -> Iterator[StepPair]:
     """`count` pairs, the same for the same seed, families and mix.
 
@@ -34,12 +38,13 @@ def synthetic_pairs(
         count: how many.
         families: of the things.
         mix: shares of pairs that show the same things, other colours, other shapes, and both.
+        kinds: of what is done (`plans.SHARES`); none for all.
 
     Raises:
         InvalidInput: if the mix is not four shares, or the families cannot give a pair of it.
     """
     wanted = shares(mix)
-    streams = {variation: _pairs(families, variation, seed) for variation in wanted}
+    streams = {variation: _pairs(families, variation, seed, kinds) for variation in wanted}
     made = dict.fromkeys(wanted, 0)
     for number in range(1, count + 1):
         due = max(wanted, key=lambda variation: wanted[variation] * number - made[variation])
@@ -47,14 +52,19 @@ def synthetic_pairs(
         yield next(streams[due])
 
 
-def _pairs(families: Mapping[str, Family], variation: Variation, seed: int) -> Iterator[StepPair]:
+def _pairs(
+    families: Mapping[str, Family], variation: Variation, seed: int, kinds: Sequence[str]
+) -> Iterator[StepPair]:
     """Pairs of one variation without end."""
     number = VARIATIONS.index(variation)
     rng = np.random.default_rng((seed, number) if number else seed)
     fruitless = 0
     while fruitless < _PATIENCE:
         try:
-            made = _same(families, rng) if variation == "same" else pairs_across(families, variation, rng)
+            if variation == "same":
+                made = _same(families, rng, kinds)
+            else:
+                made = pairs_across(families, variation, rng, kinds)
         except Unreachable:
             made = []
         yield from made
@@ -62,8 +72,8 @@ def _pairs(families: Mapping[str, Family], variation: Variation, seed: int) -> I
     raise InvalidInput("mix", f"no pair of {variation} in {_PATIENCE} scenes", "more families, or less of it")
 
 
-def _same(families: Mapping[str, Family], rng: np.random.Generator) -> list[StepPair]:
-    scene = draw_scene(families, rng)
+def _same(families: Mapping[str, Family], rng: np.random.Generator, kinds: Sequence[str]) -> list[StepPair]:
+    scene = draw_scene(families, rng, kinds=kinds)
     takes = [take(scene, rng) for _ in range(TAKES)]
     found = [
         make_pair(scene, support, query, step)

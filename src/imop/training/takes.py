@@ -48,7 +48,9 @@ def take(scene: Scene, rng: np.random.Generator) -> Take:
 
 
 def make_pair(scene: Scene, support: Take, query: Take, step: int) -> StepPair | None:
-    """The pair of a step in two takes; None if one of them does not see enough of what matters."""
+    """The pair of a step in two takes; None if it is loose or too little of what matters is seen."""
+    if scene.recipe.steps[step].loose:
+        return None
     before, now = support.poses[step], query.poses[step]
     members = rigid_with(reference(scene, step), before, now)
     return seen_pair((scene, support), (scene, query), step, members, before)
@@ -83,7 +85,7 @@ def seen_pair(
         support.clouds[step + 1],
         query.clouds[step],
         region,
-        support.states[step + 1].T_world_gripper,
+        support.states[step + 1].T_world_gripper @ shown_scene.recipe.steps[step].T_reached_recorded,
         support.states[step].T_world_gripper,
         (support.states[step].gripper_open, support.states[step + 1].gripper_open),
         motions,

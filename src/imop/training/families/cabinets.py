@@ -9,7 +9,7 @@ from imop.geometry import se3
 from imop.sim.parts.cabinet import CabinetShape, drawer_cabinet
 from imop.sim.parts.hinge import hinge
 from imop.sim.parts.shapes import METAL, WOOD, Color, box, capsule, cylinder, part
-from imop.training.families.thing import Hold, Moving, Thing, from_front, from_side, paint, up
+from imop.training.families.thing import Floor, Hold, Moving, Thing, from_front, from_side, paint, up
 
 
 def slide(body: Any, name: str, axis: tuple[float, float, float], limit: float) -> None:
@@ -36,7 +36,8 @@ def drawers(shape: np.random.Generator, color: np.random.Generator) -> Thing:
         Moving(f"drawer{k}", (0.0, sizes.travel), Hold(from_front((0, 0, 0), down), f"drawer{k}", 0.012))
         for k in range(count)
     )
-    return Thing(spec, spots=(up(z=sizes.height),), moving=moving)
+    floors = (Floor((0, 0, sizes.height), (sizes.depth / 2, sizes.width / 2)),)
+    return Thing(spec, spots=(up(z=sizes.height),), moving=moving, floors=floors)
 
 
 def door(shape: np.random.Generator, color: np.random.Generator) -> Thing:

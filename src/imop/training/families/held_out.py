@@ -12,6 +12,7 @@ from imop.sim.parts.laptop import COVER, LaptopShape, laptop
 from imop.sim.parts.pot import PotShape, lid, pot
 from imop.sim.parts.rope import RopeShape
 from imop.sim.parts.shapes import PLASTIC, box, capsule, part
+from imop.training.families.held_out_kinds import HELD_OUT_KINDS
 from imop.training.families.solids import HALF_TURN
 from imop.training.families.thing import (
     Family,
@@ -151,5 +152,6 @@ HELD_OUT: dict[str, Family] = {
     "shelf": shelf,
     "hinged box": lidded_box,
     "rope": rope,
+    **HELD_OUT_KINDS,
 }
 """What no training sees."""

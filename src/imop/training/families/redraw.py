@@ -129,7 +129,8 @@ def _outline(thing: Thing) -> tuple[object, ...]:
         tuple(hold.link for hold in (*thing.holds, *thing.pokes)),
         tuple((m.joint, m.hold.link, m.push, m.positions[0] < m.positions[1]) for m in thing.moving),
         (len(thing.holds), len(thing.spots), len(thing.rests), thing.symmetry.shape, thing.bends),
-        (thing.mount is None, thing.tool is None),
+        (thing.mount is None, thing.tool is None, thing.row, thing.sided),
+        (len(thing.keeps), len(thing.floors), len(thing.goals), len(thing.holes)),
         (model.geom_type.tolist(), model.geom_bodyid.tolist(), model.jnt_type.tolist()),
     )
 
@@ -138,7 +139,8 @@ def _frames(thing: Thing) -> list[FloatArray]:
     """(3, 3) rotations of everything that an action is fixed to."""
     holds = (*thing.holds, *thing.pokes, *(moving.hold for moving in thing.moving))
     others = [T for T in (thing.mount, thing.tool) if T is not None]
-    return [T[:3, :3] for T in (*(hold.T_link_gripper for hold in holds), *thing.spots, *others)]
+    places = (*thing.spots, *thing.keeps, *thing.goals, *thing.holes)
+    return [T[:3, :3] for T in (*(hold.T_link_gripper for hold in holds), *places, *others)]
 
 
 def _as_far(first: Thing, other: Thing) -> tuple[Moving, ...]:

@@ -4,7 +4,7 @@ import numpy as np
 
 from imop.geometry import se3
 from imop.sim.parts.shapes import PAPER, PLASTIC, WOOD, Color, box, cylinder, part
-from imop.training.families.thing import Hold, Thing, from_above, from_side, paint, up
+from imop.training.families.thing import Floor, Hold, Thing, from_above, from_side, paint, up
 from imop.types import FloatArray
 
 HALF_TURN = np.stack([np.eye(4), se3.make(se3.euler(z=np.pi))])
@@ -66,7 +66,8 @@ def tray(shape: np.random.Generator, color: np.random.Generator) -> Thing:
         box(body, (wall - x, a, wall), (x - wall, b, z), sides, WOOD)
     grips = (Hold(from_above((0, y - wall / 2, z - 0.012)), width=wall),)
     spots = (up(z=wall), up(x / 2, 0, wall), up(-x / 2, 0, wall))
-    return Thing(spec, grips, spots=spots, symmetry=HALF_TURN)
+    floors = (Floor((0, 0, wall), (x - wall, y - wall)),)
+    return Thing(spec, grips, spots=spots, symmetry=HALF_TURN, floors=floors)
 
 
 def rack(shape: np.random.Generator, color: np.random.Generator) -> Thing:

@@ -47,6 +47,19 @@ class Moving:
 
 
 @dataclass(frozen=True, eq=False)
+class Floor:
+    """A level surface of a thing on which another one may lie anywhere.
+
+    Attributes:
+        middle: (3,) metres in the body's frame.
+        half: half sizes along the body's x and y, metres.
+    """
+
+    middle: tuple[float, float, float]
+    half: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
 class Thing:
     """An object of a family.
 
@@ -61,6 +74,13 @@ class Thing:
         symmetry: (S, 4, 4) motions of the body's frame that change nothing that can be seen.
         rests: rotations (3, 3) in which it lies stably.
         tool: T_body_tip (4, 4) of its working end, z outwards, or None if it is no tool.
+        keeps: T_body_keep (4, 4) frames, z up, to which the underside of what is held is brought and stays in
+            the hand; it comes from +x, or from above.
+        floors: where other things lie on it or in it.
+        goals: T_body_goal (4, 4) frames, z up, to which something is pushed along +x.
+        holes: T_body_hole (4, 4) frames, z outwards, at the bottom of holes in its upper side.
+        row: whether its joints are equal to each other and differ in their places only.
+        sided: whether it looks almost the same when it is turned, and where one acts tells its sides.
     """
 
     part: Any
@@ -73,6 +93,12 @@ class Thing:
     symmetry: FloatArray = field(default_factory=lambda: np.eye(4)[None])
     rests: tuple[FloatArray, ...] = (np.eye(3),)
     tool: FloatArray | None = None
+    keeps: tuple[FloatArray, ...] = ()
+    floors: tuple[Floor, ...] = ()
+    goals: tuple[FloatArray, ...] = ()
+    holes: tuple[FloatArray, ...] = ()
+    row: bool = False
+    sided: bool = False
 
 
 Family = Callable[[np.random.Generator, np.random.Generator], Thing]
