@@ -16,6 +16,7 @@ class CloseJar(RLBenchTask):
     """Take the lid, put it onto the jar and turn it a quarter."""
 
     name = "rlbench/close_jar"
+    told_by_color = True
     aims = NAMES
     variations = len(NAMES)
     words = (

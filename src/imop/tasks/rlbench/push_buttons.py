@@ -27,6 +27,7 @@ class PushButtons(RLBenchTask):
     """Push one to three of the buttons from above with the closed gripper; others may be pushed, too."""
 
     name = "rlbench/push_buttons"
+    told_by_color = True
     aims = tuple(" button, then the ".join(sequence(i)) for i in range(VARIATIONS))
     variations = VARIATIONS
     words = ("push the {} button", "press the {} button", "push down the {} button")
