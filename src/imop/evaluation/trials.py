@@ -52,6 +52,10 @@ class Trial:
         """What the scene, and what is seen of it, differs in."""
         return Change.of(self.change, self.task, self.variation, self.instance, self.seed)
 
+    def make_task(self) -> Task:
+        """The task, its things at their size in the scene."""
+        return self.changed.of_size(make_task(self.task))
+
     def env(self) -> ImopEnv:
         """The environment, reset to this scene.
 
@@ -60,8 +64,7 @@ class Trial:
         """
         if not 0 <= self.seed < DEMONSTRATION_SEED:
             raise InvalidInput("seed", f"{self.seed}", f"0 .. {DEMONSTRATION_SEED - 1}")
-        task = make_task(self.task)
-        env = ImopEnv(task, change=self.changed, sense=self.changed.tested)
+        env = ImopEnv(self.make_task(), change=self.changed, sense=self.changed.tested)
         env.reset(seed=self.seed, options={"variation": self.variation, "instance_seed": self.instance})
         return env
 

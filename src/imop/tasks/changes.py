@@ -105,6 +105,12 @@ class Change:
     def _rng(self, factor: str, *numbers: int) -> np.random.Generator:
         return np.random.default_rng((zlib.crc32(factor.encode()), *self.setup, *numbers))
 
+    def of_size(self, task: Task) -> Task:
+        """The task with its things at the size of the scene."""
+        if "object_size" not in self.factors or task.sizes is None:
+            return task
+        return task.resized(self._rng("object_size", self.seed).uniform(*task.sizes))
+
     def furnish(self, spec: Any) -> None:
         """Add the distractors, see `SceneChange`."""
         if "distractors" in self.factors:

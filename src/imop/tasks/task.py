@@ -30,9 +30,9 @@ class Task(ABC):
     """
 
     name: str = ""
-    variations: ClassVar[int] = 1
-    step_limit: ClassVar[int] = 25
-    insist: ClassVar[bool] = False
+    variations: int = 1
+    step_limit: int = 25
+    insist: bool = False
     graspable: tuple[str, ...] = ()
     told_by_color: ClassVar[bool] = False
     sizes: ClassVar[tuple[float, float] | None] = None
@@ -41,6 +41,14 @@ class Task(ABC):
     def available(cls) -> bool:
         """Whether all files that the task needs are there."""
         return True
+
+    def resized(self, scale: float) -> "Task":
+        """The task with all its things at `scale` times their size.
+
+        Raises:
+            InvalidInput: if they have one size only.
+        """
+        raise InvalidInput("scale", f"{scale} for {self.name}", "a task with `sizes`")
 
     @abstractmethod
     def instructions(self, variation: int) -> tuple[str, ...]:

@@ -47,7 +47,7 @@ class PushButtons(RLBenchTask):
         steps = []
         for i in range(len(sequence(self.variation))):
             base = f"push_buttons_target{i}"
-            above = se3.make(DOWN, scene.pose(base)[:3, 3] + (0, 0, _ABOVE))
+            above = se3.make(DOWN, scene.pose(base)[:3, 3] + (0, 0, scene.scale * _ABOVE))
             steps += carried(scene, base, "waypoint0", above, ("waypoint0", "waypoint1"))
         return steps
 

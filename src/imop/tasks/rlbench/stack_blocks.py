@@ -54,7 +54,8 @@ class StackBlocks(RLBenchTask):
             x, y = scene.pose(block)[:2, 0]
             grasp = se3.make(se3.euler(z=float(np.arctan2(y, x))) @ DOWN, scene.pose(block)[:3, 3])
             T_above = scene.pose("waypoint3")
-            above = se3.make(T_above[:3, :3], scene.pose(base)[:3, 3] + (0, 0, _FIRST + _EACH * k))
+            up = scene.scale * (_FIRST + _EACH * k)
+            above = se3.make(T_above[:3, :3], scene.pose(base)[:3, 3] + (0, 0, up))
             last = k == self.height - 1
             steps += carried(scene, block, "waypoint1", grasp, ("waypoint0", "waypoint1", "waypoint2"))
             after = ("waypoint3", "waypoint4") if last else ("waypoint3", "waypoint4", "waypoint5")

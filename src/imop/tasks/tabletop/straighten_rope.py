@@ -45,6 +45,8 @@ class StraightenRope(TableTask):
 
     name = "tabletop/straighten_rope"
     told_by_color = True
+    sizes = None
+    sizes = None
 
     def instructions(self, variation: int) -> tuple[str, ...]:
         return (
