@@ -54,6 +54,7 @@ def run(
     demo: Path | None = None,
     demo_episode: int = 0,
     method: str = "learned",
+    change: Annotated[str, tyro.conf.arg(metavar="FACTOR,FACTOR")] = "",
     weights: Path | None = None,
     min_confidence: float = 0.0,
     video: bool = True,
@@ -74,6 +75,7 @@ def run(
         demo_episode: which of its episodes.
         method: learned, routed, replay, registration, textbook, oracle (true object poses), or one's own,
             such as my_methods:MyPolicy.
+        change: what the scene differs in from the demonstrated one, as in `imop eval`.
         weights: folder that `imop train` wrote; by default the bundled weights.
         min_confidence: stop instead of acting below this confidence, 0 to 1.
         video: whether to draw rollout.mp4, which takes longer than the task itself.
@@ -82,16 +84,20 @@ def run(
     from imop.demos.load import load_demonstration
     from imop.evaluation.run import perform, steps_table
     from imop.evaluation.trials import Trial, demonstration_for
+    from imop.tasks.changes import changes_of
+    from imop.tasks.suites import find_task
 
     writable_folder(out)
-    trial = Trial(task, seed, variation, instance)
+    factors = ",".join(changes_of({task: find_task(task)}, change)[task])
+    trial = Trial(task, seed, variation, instance, factors)
     with _status(f"recording one demonstration of {task}" if demo is None else f"reading {demo}"):
         shown = demonstration_for(trial) if demo is None else load_demonstration(demo, demo_episode)
     with _status(f"performing {task} in scene {seed}"):
         result = perform(trial, shown, method, out, min_confidence, video, weights)
     console.print(steps_table(result))
+    changed = f", changed: {factors}" if factors else ""
     console.print(
-        f"{task}, scene {seed}: {'success' if result.success else f'failed: {result.reason}'}",
+        f"{task}, scene {seed}{changed}: {'success' if result.success else f'failed: {result.reason}'}",
         style="green" if result.success else "red",
     )
     _list(out)
@@ -151,6 +157,7 @@ def evaluate(
     episodes: int = 25,
     seed: int = 0,
     instance: int = 0,
+    change: Annotated[str, tyro.conf.arg(metavar="FACTOR,FACTOR")] = "",
     jobs: int = 2,
     weights: Path | None = None,
     out: Path = Path("runs/eval"),
@@ -171,6 +178,9 @@ def evaluate(
         episodes: scenes per task, spread over its variations.
         seed: first seed of the scenes.
         instance: seed of the objects' shapes, sizes and colours.
+        change: what the scenes differ in from the demonstrated ones, joined by commas: object_color,
+            object_size, light, table_color, distractors, camera_pose, or all of these as all; errors of the
+            sensors d415, calibration, knocked, fewer_cameras. docs/tasks.md says what they are.
         jobs: parallel processes.
         weights: folder that `imop train` wrote, for the learned policy; by default the bundled weights.
         out: folder for the results.
@@ -180,7 +190,7 @@ def evaluate(
     writable_folder(out)
     log = out / "episodes.jsonl"
     results = evaluate_suite(
-        suite, split, tasks, methods.split(","), episodes, seed, instance, jobs, console, log, weights
+        suite, split, tasks, methods.split(","), episodes, seed, instance, jobs, console, log, weights, change
     )
     results.save(out)
     console.print(results.table())

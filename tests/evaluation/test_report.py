@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -33,3 +34,10 @@ def test_the_report_shows_every_count_with_its_interval(tmp_path):
     report = (tmp_path / "report.md").read_text()
     assert "| a | 25 % [5, 70] | 100 % [51, 100] |" in report
     assert "| average | 12.5 % | 75.0 % |" in report and "- Same instances." in report
+
+
+def test_a_change_is_named_in_everything_that_is_written(tmp_path):
+    replace(RESULTS, change="light,d415").save(tmp_path)
+    assert json.loads((tmp_path / "results.json").read_text())["change"] == "light,d415"
+    assert (tmp_path / "report.md").read_text().splitlines()[0].endswith("changed: light,d415")
+    assert "changed" not in RESULTS.markdown()

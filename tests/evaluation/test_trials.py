@@ -1,7 +1,9 @@
 import pytest
 
 from imop.errors import InvalidInput
-from imop.evaluation.trials import DEMONSTRATION_SEED, suite_trials
+from imop.evaluation.methods import make_policy
+from imop.evaluation.rollout import rollout
+from imop.evaluation.trials import DEMONSTRATION_SEED, Trial, change_notes, demonstration_for, suite_trials
 
 
 def test_scenes_that_would_be_those_of_demonstrations_are_refused_before_any_is_tried():
@@ -10,3 +12,31 @@ def test_scenes_that_would_be_those_of_demonstrations_are_refused_before_any_is_
     assert [trial.seed for trial in trials] == [last, last + 1]
     with pytest.raises(InvalidInput, match="seed"):
         suite_trials("tabletop", "all", ("lid_off_pot",), 3, last, 0)
+
+
+def test_every_task_gets_the_changes_that_it_has_and_one_without_any_is_left_out():
+    names = ("lid_off_pot", "stack_cubes")
+    trials = suite_trials("tabletop", "all", names, 1, 0, 0, "d415,object_color")
+    assert [trial.change for (trial,) in trials.values()] == ["object_color,d415", "d415"]
+    assert change_notes(trials, "d415,object_color")[-1] == "object_color was not changed in stack_cubes."
+    assert list(suite_trials("tabletop", "all", names, 1, 0, 0, "object_color")) == ["lid_off_pot"]
+
+
+def test_a_change_has_one_name_whatever_the_order():
+    assert Trial("tabletop/lid_off_pot", 0, change="d415,light") == Trial(
+        "tabletop/lid_off_pot", 0, change="light,d415,"
+    )
+    with pytest.raises(InvalidInput, match="change"):
+        Trial("tabletop/lid_off_pot", 0, change="darkness")
+
+
+def test_a_missing_camera_is_missing_in_demonstration_and_test_and_no_policy_minds():
+    trial = Trial("tabletop/lid_off_pot", 3, change="fewer_cameras")
+    env, shown = trial.env(), demonstration_for(trial)
+    seen = [*(k.observation for k in shown.keyframes), shown.final, env.observation]
+    assert {frozenset(observation.views) for observation in seen} == {
+        frozenset(("front", "left_shoulder", "wrist"))
+    }
+    policy = make_policy("registration")
+    policy.watch(shown.stripped())
+    assert rollout(env, policy, len(shown)).success

@@ -3,7 +3,7 @@ import numpy as np
 from imop.geometry import se3
 from imop.geometry.neighbours import nearest
 from imop.sim.cameras import CAMERAS
-from imop.training.depth_noise import DepthNoise
+from imop.sim.depth_noise import DepthNoise
 from imop.training.families import TRAINING
 from imop.training.stage import Stage, State
 from imop.training.viewpoints import SHIFT, TURN, placed_cameras

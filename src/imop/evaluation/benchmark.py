@@ -12,7 +12,7 @@ from imop.evaluation.jobs import parallel
 from imop.evaluation.methods import make_policy
 from imop.evaluation.report import Count, Results
 from imop.evaluation.rollout import rollout
-from imop.evaluation.trials import Trial, demonstration_for, most_actions, suite_trials
+from imop.evaluation.trials import Trial, change_notes, demonstration_for, most_actions, suite_trials
 from imop.tasks.expert import perform
 from imop.tasks.layout import NoRoom
 from imop.types import Demonstration
@@ -20,7 +20,8 @@ from imop.types import Demonstration
 NOTES = (
     "One demonstration per task and variation, from a scene that is never tested.",
     "The networks of learned saw synthetic pairs and base tasks with other objects; others saw nothing.",
-    "Demonstrated and tested objects have the same shapes and colours; poses and clutter differ.",
+    "Demonstrated and tested objects have the same shapes and colours, unless they are changed; poses and "
+    "clutter differ.",
     "replay, registration and learned see four 128 x 128 RGB-D views, camera poses, joint positions and "
     "the gripper; no segmentation, names or object poses.",
     "oracle carries the demonstrated poses over by the true object pose; expert reads everything.",
@@ -40,6 +41,7 @@ def evaluate_suite(
     console: Console,
     log: Path,
     weights: Path | None = None,
+    change: str = "",
 ) -> Results:
     """Try every method in the same `episodes` scenes of every task.
 
@@ -55,12 +57,13 @@ def evaluate_suite(
         console: for the progress.
         log: file of episodes; what is in it is not tried again.
         weights: of the learned policy; None for the bundled ones.
+        change: what the scenes differ in, names of `tasks.changes.FACTORS` joined by commas.
 
     Raises:
-        InvalidInput: for an unknown suite, split, task or method.
+        InvalidInput: for an unknown suite, split, task, method or change.
         CorruptData: if the log cannot be read.
     """
-    trials = suite_trials(suite, split, tasks, episodes, seed, instance)
+    trials = suite_trials(suite, split, tasks, episodes, seed, instance, change)
     for method in methods:
         if method not in ("oracle", "expert"):
             make_policy(method, weights=weights)  # what is missing is said before anything is tried
@@ -87,7 +90,8 @@ def evaluate_suite(
         }
         for method in methods
     }
-    return Results(suite, ",".join(tasks) or split, seed, counts, NOTES)
+    names = ",".join(tasks) or split
+    return Results(suite, names, seed, counts, (*NOTES, *change_notes(trials, change)), change)
 
 
 def attempt(
@@ -118,14 +122,14 @@ def _count(episodes: list[Episode | None]) -> Count:
     return Count(sum(tried), len(tried))
 
 
-def shown_together(trial: Trial) -> tuple[str, int, int]:
+def shown_together(trial: Trial) -> tuple[str, int, int, str]:
     """What trials with the same demonstration have in common."""
-    return trial.task, trial.variation, trial.instance
+    return trial.task, trial.variation, trial.instance, trial.change
 
 
 def _demonstrations(
     trials: list[Trial], jobs: int, console: Console
-) -> dict[tuple[str, int, int], Demonstration]:
+) -> dict[tuple[str, int, int, str], Demonstration]:
     wanted = {shown_together(trial): trial for trial in trials}
     work = [delayed(demonstration_for)(trial) for trial in wanted.values()]
     return dict(zip(wanted, parallel(work, jobs, console, "demonstrations"), strict=True))

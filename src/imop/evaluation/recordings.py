@@ -85,7 +85,7 @@ class Recordings:
 
 def objects_world(trial: Trial) -> World:
     """The objects of the trial's task alone, not placed."""
-    task, spec = make_task(trial.task), scene_spec()
+    task, spec = trial.make_task(), scene_spec()
     task.build(spec, trial.variation, np.random.default_rng((trial.instance, trial.variation)))
     world = World(spec)
     task.prepare(world)

@@ -39,6 +39,7 @@ class Results:
         seed: first seed of the scenes.
         counts: method -> task -> count.
         notes: what a reader must know to compare the numbers, one sentence each.
+        change: what the scenes differed in from the demonstrated ones; nothing but poses if empty.
     """
 
     suite: str
@@ -46,6 +47,7 @@ class Results:
     seed: int
     counts: Mapping[str, Mapping[str, Count]]
     notes: tuple[str, ...] = ()
+    change: str = ""
 
     def average(self, method: str) -> float:
         """Mean of the tasks' success rates."""
@@ -64,7 +66,8 @@ class Results:
             }
             for name, tasks in self.counts.items()
         }
-        return {"suite": self.suite, "split": self.split, "seed": self.seed, "methods": methods}
+        head = {"suite": self.suite, "split": self.split, "seed": self.seed, "change": self.change}
+        return {**head, "methods": methods}
 
     def rows(self) -> list[list[str]]:
         """Header and one row per task, then the average."""
@@ -75,11 +78,15 @@ class Results:
         rows.append(["average", *(f"{100 * self.average(m):.1f} %" for m in methods)])
         return rows
 
+    @property
+    def _changed(self) -> str:
+        return f", changed: {self.change}" if self.change else ""
+
     def markdown(self) -> str:
         """The table with its conditions, as Markdown."""
         header, *body = self.rows()
         lines = [
-            f"# {self.suite}, {self.split} tasks, scenes from seed {self.seed}",
+            f"# {self.suite}, {self.split} tasks, scenes from seed {self.seed}{self._changed}",
             "",
             "Success rates with 95 % Wilson intervals; every method saw the same demonstrations and scenes.",
             "",
@@ -94,7 +101,7 @@ class Results:
     def table(self) -> Table:
         """The table for the terminal."""
         header, *body = self.rows()
-        table = Table(title=f"{self.suite}, {self.split}, seed {self.seed}")
+        table = Table(title=f"{self.suite}, {self.split}, seed {self.seed}{self._changed}")
         for name in header:
             table.add_column(name)
         for row in body:

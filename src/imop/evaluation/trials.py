@@ -1,10 +1,14 @@
 """Which scene a method is tried in, and which demonstration it was shown before."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.splits import chosen_tasks
-from imop.tasks.env import ImopEnv, make_env, make_task
+from imop.sim.sensing import Sensing
+from imop.tasks.changes import FACTORS, Change, changes_of, read_factors
+from imop.tasks.env import ImopEnv, make_task
 from imop.tasks.expert import ExpertFailed, record_demonstration
 from imop.tasks.layout import NoRoom
 from imop.tasks.suites import find_task
@@ -25,20 +29,32 @@ class Trial:
         seed: of the poses and the clutter.
         variation: of the task.
         instance: seed of shapes, sizes and colours.
+        change: names of `tasks.changes.FACTORS`, joined by commas; what the scene differs in.
 
     Raises:
-        InvalidInput: for a negative seed.
+        InvalidInput: for a negative seed, or an unknown change.
     """
 
     task: str
     seed: int
     variation: int = 0
     instance: int = 0
+    change: str = ""
 
     def __post_init__(self) -> None:
         for name in ("seed", "instance"):
             if getattr(self, name) < 0:
                 raise InvalidInput(name, f"{getattr(self, name)}", "a whole number from 0 on")
+        object.__setattr__(self, "change", ",".join(read_factors(self.change)))
+
+    @cached_property
+    def changed(self) -> Change:
+        """What the scene, and what is seen of it, differs in."""
+        return Change.of(self.change, self.task, self.variation, self.instance, self.seed)
+
+    def make_task(self) -> Task:
+        """The task, its things at their size in the scene."""
+        return self.changed.of_size(make_task(self.task))
 
     def env(self) -> ImopEnv:
         """The environment, reset to this scene.
@@ -48,13 +64,15 @@ class Trial:
         """
         if not 0 <= self.seed < DEMONSTRATION_SEED:
             raise InvalidInput("seed", f"{self.seed}", f"0 .. {DEMONSTRATION_SEED - 1}")
-        env = make_env(self.task)
+        env = ImopEnv(self.make_task(), change=self.changed, sense=self.changed.tested)
         env.reset(seed=self.seed, options={"variation": self.variation, "instance_seed": self.instance})
         return env
 
 
 def demonstration_for(trial: Trial) -> Demonstration:
     """One demonstration of the trial's task, variation and instance, in a scene that is never tested.
+
+    The trial's change of the scene does not apply to it, but that of the set-up does.
 
     Raises:
         ExpertFailed: if the expert succeeds in none of the scenes it may choose from.
@@ -63,30 +81,64 @@ def demonstration_for(trial: Trial) -> Demonstration:
     task = make_task(trial.task)
     for seed in range(DEMONSTRATION_SEED, DEMONSTRATION_SEED + _RECORDING_ATTEMPTS):
         try:
-            return record_demonstration(task, seed, trial.variation, trial.instance)
+            recorded = record_demonstration(task, seed, trial.variation, trial.instance)
+            return _seen(recorded, trial.changed.shown)
         except (ExpertFailed, NoRoom) as error:
             failure: ImopError = error
     raise failure
 
 
+def _seen(demonstration: Demonstration, sensing: Sensing) -> Demonstration:
+    """The demonstration as other cameras in the same places would have seen it."""
+    steps = (replace(k, observation=sensing.worsened(k.observation)) for k in demonstration.keyframes)
+    return replace(demonstration, keyframes=tuple(steps), final=sensing.worsened(demonstration.final))
+
+
 def suite_trials(
-    suite: str, split: str, tasks: tuple[str, ...], episodes: int, seed: int, instance: int
+    suite: str,
+    split: str,
+    tasks: tuple[str, ...],
+    episodes: int,
+    seed: int,
+    instance: int,
+    change: str = "",
 ) -> dict[str, list[Trial]]:
     """`episodes` scenes for each task, by its name within the suite, with the task's variations in turn.
 
+    Of a change every task gets the factors that it has; tasks that have none of them are left out.
+
     Raises:
-        InvalidInput: for an unknown suite, split or task, no episodes, or seeds of demonstrations.
+        InvalidInput: for an unknown suite, split, task or change, a change that none of the tasks has, no
+            episodes, or seeds of demonstrations.
     """
     if episodes < 1:
         raise InvalidInput("episodes", f"{episodes}", "at least 1")
     if seed + episodes > DEMONSTRATION_SEED:
         problem = f"{episodes} scenes from {seed} on"
         raise InvalidInput("seed", problem, f"scenes below {DEMONSTRATION_SEED}, where demonstrations begin")
-    variations = {name: find_task(name).variations for name in chosen_tasks(suite, split, tasks)}
+    kinds = {name: find_task(name) for name in chosen_tasks(suite, split, tasks)}
+    changes = changes_of(kinds, change)
     return {
-        name.removeprefix(f"{suite}/"): [Trial(name, seed + i, i % count, instance) for i in range(episodes)]
-        for name, count in variations.items()
+        name.removeprefix(f"{suite}/"): [
+            Trial(name, seed + i, i % kind.variations, instance, ",".join(changes[name]))
+            for i in range(episodes)
+        ]
+        for name, kind in kinds.items()
+        if changes[name] or not change
     }
+
+
+def change_notes(trials: Mapping[str, Sequence[Trial]], change: str) -> list[str]:
+    """What a change means, and which tasks of `suite_trials` do not have all of its factors."""
+    wanted = read_factors(change)
+    lacking = {
+        factor: [task for task, (trial, *_) in trials.items() if factor not in trial.changed.factors]
+        for factor in wanted
+    }
+    without = [
+        f"{factor} was not changed in {', '.join(tasks)}." for factor, tasks in lacking.items() if tasks
+    ]
+    return [*(f"{factor}: {FACTORS[factor]}" for factor in wanted), *without]
 
 
 def most_actions(method: str, demonstration: Demonstration, task: Task) -> int:

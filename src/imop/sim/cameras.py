@@ -132,8 +132,11 @@ def _shade(world: World, hits: _Hits) -> ByteArray:
     facing = np.sum(view * hits.normal, axis=1)
     normal = hits.normal * np.where(facing < 0, -1.0, 1.0)[:, None]
     lamp = np.clip(normal @ LAMP_DIRECTION, 0.0, None)
-    light = AMBIENT + HEADLIGHT * np.abs(facing) + LAMP * lamp
-    rgb = _paint(world, hits) * light[:, None]
+    lamps = (
+        np.outer(HEADLIGHT * np.abs(facing), world.light_color),
+        np.outer(LAMP * lamp, world.light_color),
+    )
+    rgb = _paint(world, hits) * (AMBIENT + lamps[0] + lamps[1])
     rgb[hits.geom < 0] = BACKGROUND
     image: ByteArray = np.round(255 * np.clip(rgb, 0.0, 1.0)).astype(np.uint8)
     return image

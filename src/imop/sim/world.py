@@ -120,6 +120,7 @@ class World:
         instance_names: instance id -> name.
         graspable: names of the bodies that the gripper may attach.
         unavoided: numbers of the bodies that motion planning does not care about; none unless a task says so.
+        light_color: (3,) red, green, blue, 0 .. 1, of the lamps as cameras see them; white.
     """
 
     def __init__(self, spec: Any):
@@ -140,6 +141,7 @@ class World:
         names = [self.model.equality(i).name for i in range(self.model.neq)]
         self.graspable = tuple(name.removeprefix(GRASP) for name in names if name.startswith(GRASP))
         self.unavoided: frozenset[int] = frozenset()
+        self.light_color: FloatArray = np.ones(3)
         self.arm_qpos = np.array([self.model.joint(name).qposadr[0] for name in ARM_JOINTS])
         self.arm_dof = np.array([self.model.joint(name).dofadr[0] for name in ARM_JOINTS])
         self.arm_ctrl = np.array([self.model.actuator(name).id for name in ARM_JOINTS])

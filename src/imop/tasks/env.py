@@ -1,6 +1,6 @@
 """Tasks as Gymnasium environments: one step reaches one gripper pose, then moves the fingers."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import gymnasium
@@ -15,7 +15,7 @@ from imop.sim.gripper import OnFrame
 from imop.sim.motion import WORKSPACE_LOWER, WORKSPACE_UPPER
 from imop.sim.world import World
 from imop.tasks.suites import find_task
-from imop.tasks.task import Task, make_scene, wait, watching
+from imop.tasks.task import SceneChange, Task, make_scene, wait, watching
 from imop.types import Action, CameraView, FloatArray, Observation, as_array
 
 IMAGE = 128
@@ -126,14 +126,23 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
         variation: number of the aim, where `reset` is not told.
         step_limit: the episode is truncated after so many steps; the task's own limit if None.
         on_frame: called with the world every 0.05 simulated seconds.
+        change: of every scene, if any.
+        sense: looks at the world at a time step; `observation_space` describes the robot's own cameras.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 (Gymnasium's name and type)
 
     def __init__(
-        self, task: Task, variation: int = 0, step_limit: int | None = None, on_frame: OnFrame | None = None
+        self,
+        task: Task,
+        variation: int = 0,
+        step_limit: int | None = None,
+        on_frame: OnFrame | None = None,
+        change: SceneChange | None = None,
+        sense: Callable[[World, int], Observation] = observe,
     ):
         self.task, self.variation, self.on_frame = task, variation, on_frame
+        self._change, self._sense = change, sense
         self._step_limit = step_limit or task.step_limit
         self._world: World | None = None
         self._observation: Observation | None = None
@@ -187,7 +196,7 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
         instance = int(given.pop("instance_seed", episode))
         if given:
             raise InvalidInput("options", ", ".join(map(str, given)), "variation, instance_seed")
-        self._world = make_scene(self.task, variation, instance, episode)
+        self._world = make_scene(self.task, variation, instance, episode, self._change)
         info = {
             "success": False,
             "variation": variation,
@@ -219,5 +228,5 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
         return wait(self.task, self.world, watching(self.task, self.on_frame))
 
     def _observe(self, time_step: int) -> ObservationDict:
-        self._observation = observe(self.world, min(time_step, self._step_limit))
+        self._observation = self._sense(self.world, min(time_step, self._step_limit))
         return _to_dict(self._observation)

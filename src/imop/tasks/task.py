@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -24,18 +24,31 @@ class Task(ABC):
         step_limit: how many actions an episode may take.
         insist: whether a motion that would touch something is made all the same if there is no other.
         graspable: bodies that the gripper may attach.
+        told_by_color: whether the things acted on are told from others by their colours, which then must
+            stay as they were demonstrated.
+        sizes: smallest and largest scale of its things, see `resized`; None if they have one size only.
     """
 
     name: str = ""
-    variations: ClassVar[int] = 1
-    step_limit: ClassVar[int] = 25
-    insist: ClassVar[bool] = False
+    variations: int = 1
+    step_limit: int = 25
+    insist: bool = False
     graspable: tuple[str, ...] = ()
+    told_by_color: ClassVar[bool] = False
+    sizes: ClassVar[tuple[float, float] | None] = None
 
     @classmethod
     def available(cls) -> bool:
         """Whether all files that the task needs are there."""
         return True
+
+    def resized(self, scale: float) -> "Task":
+        """The task with all its things at `scale` times their size.
+
+        Raises:
+            InvalidInput: if they have one size only.
+        """
+        raise InvalidInput("scale", f"{scale} for {self.name}", "a task with `sizes`")
 
     @abstractmethod
     def instructions(self, variation: int) -> tuple[str, ...]:
@@ -71,6 +84,20 @@ class Task(ABC):
         """Whether the aim is reached now."""
 
 
+class SceneChange(Protocol):
+    """What is changed in a scene while it is made, after what its seeds say."""
+
+    def furnish(self, spec: Any) -> None:
+        """Add what the task does not know, away from its place: it must not disturb `Task.reset`."""
+
+    def finish(self, task: Task, world: World) -> None:
+        """Change the scene that was reset.
+
+        Raises:
+            NoRoom: if something found no place.
+        """
+
+
 def watching(task: Task, on_frame: OnFrame | None) -> OnFrame:
     """What to call every 0.05 simulated seconds so that the task and somebody else can watch."""
 
@@ -92,7 +119,9 @@ def wait(task: Task, world: World, watch: OnFrame) -> bool:
     return task.success(world)
 
 
-def make_scene(task: Task, variation: int, instance_seed: int, seed: int) -> World:
+def make_scene(
+    task: Task, variation: int, instance_seed: int, seed: int, change: SceneChange | None = None
+) -> World:
     """The scene of one episode: same arguments, same scene.
 
     Args:
@@ -100,6 +129,7 @@ def make_scene(task: Task, variation: int, instance_seed: int, seed: int) -> Wor
         variation: number of the aim.
         instance_seed: decides shapes, sizes and colours of the task's objects.
         seed: decides poses and clutter.
+        change: of this scene, if any.
 
     Raises:
         InvalidInput: if the task has no such variation.
@@ -110,9 +140,13 @@ def make_scene(task: Task, variation: int, instance_seed: int, seed: int) -> Wor
     spec = scene_spec()
     task.build(spec, variation, np.random.default_rng((instance_seed, variation)))
     task.furnish(spec, np.random.default_rng((seed, 1)))
+    if change is not None:
+        change.furnish(spec)
     for body in task.graspable:
         allow_grasp(spec, body)
     world = World(spec)
     task.prepare(world)
     task.reset(world, np.random.default_rng((seed, 2)))
+    if change is not None:
+        change.finish(task, world)
     return world

@@ -9,7 +9,7 @@ from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud
 from imop.networks.changes import COMPARED
-from imop.training.depth_noise import DepthNoise
+from imop.sim.depth_noise import DepthNoise
 from imop.training.families.thing import Family
 from imop.training.mishaps import Mishap, mishaps
 from imop.training.scenes import Scene, demonstrate, draw_scene

@@ -13,10 +13,10 @@ from imop.geometry.perception import Perception
 from imop.networks.graph import GraphConfig, thin
 from imop.robots.panda import FINGER_STROKE, PANDA_HOME_Q, panda_self_filter
 from imop.sim.cameras import CAMERAS, Camera, observe
+from imop.sim.depth_noise import DepthNoise
 from imop.sim.kinematics import inverse_kinematics
 from imop.sim.parts.shapes import add_to
 from imop.sim.world import TABLE_HEIGHT, World, scene_spec
-from imop.training.depth_noise import DepthNoise
 from imop.training.families.thing import Thing
 from imop.types import FloatArray, Observation
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud
-from imop.training.depth_noise import DepthNoise
+from imop.sim.depth_noise import DepthNoise
 from imop.training.families.thing import Thing, revolution
 from imop.training.pairs import StepPair
 from imop.training.scenes import Scene, demonstrate

@@ -13,6 +13,7 @@ class BasketballInHoop(RLBenchTask):
     """Take the ball and let it go over the hoop."""
 
     name = "rlbench/basketball_in_hoop"
+    sizes = (0.75, 1.15)
     words = (
         "put the ball in the hoop",
         "play basketball",

@@ -16,6 +16,8 @@ class CloseJar(RLBenchTask):
     """Take the lid, put it onto the jar and turn it a quarter."""
 
     name = "rlbench/close_jar"
+    sizes = (0.85, 1.0)  # larger lids do not fit between the fingers
+    told_by_color = True
     aims = NAMES
     variations = len(NAMES)
     words = (

@@ -13,6 +13,7 @@ class CloseLaptopLid(RLBenchTask):
     """Push the lid over and down."""
 
     name = "rlbench/close_laptop_lid"
+    sizes = (0.75, 1.0)
     words = (
         "close laptop lid",
         "close the laptop",

@@ -17,6 +17,8 @@ class InsertOntoSquarePeg(RLBenchTask):
     """Take the ring and let it down around the peg."""
 
     name = "rlbench/insert_onto_square_peg"
+    sizes = (1.0, 1.15)
+    told_by_color = True
     aims = NAMES
     variations = len(NAMES)
     words = (

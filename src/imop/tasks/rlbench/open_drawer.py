@@ -16,6 +16,7 @@ class OpenDrawer(RLBenchTask):
     """Grip the variation's handle and pull."""
 
     name = "rlbench/open_drawer"
+    sizes = (0.75, 1.0)
     aims = LEVELS
     variations = len(LEVELS)
     words = (

@@ -27,6 +27,7 @@ class PushButtons(RLBenchTask):
     """Push one to three of the buttons from above with the closed gripper; others may be pushed, too."""
 
     name = "rlbench/push_buttons"
+    told_by_color = True
     aims = tuple(" button, then the ".join(sequence(i)) for i in range(VARIATIONS))
     variations = VARIATIONS
     words = ("push the {} button", "press the {} button", "push down the {} button")
@@ -46,7 +47,7 @@ class PushButtons(RLBenchTask):
         steps = []
         for i in range(len(sequence(self.variation))):
             base = f"push_buttons_target{i}"
-            above = se3.make(DOWN, scene.pose(base)[:3, 3] + (0, 0, _ABOVE))
+            above = se3.make(DOWN, scene.pose(base)[:3, 3] + (0, 0, scene.scale * _ABOVE))
             steps += carried(scene, base, "waypoint0", above, ("waypoint0", "waypoint1"))
         return steps
 

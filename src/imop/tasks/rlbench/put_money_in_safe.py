@@ -16,6 +16,7 @@ class PutMoneyInSafe(RLBenchTask):
     """Take the stack from the roof of the safe and lay it down inside."""
 
     name = "rlbench/put_money_in_safe"
+    sizes = (0.85, 1.0)
     aims = SHELVES
     variations = len(SHELVES)
     words = (

@@ -16,6 +16,8 @@ class ReachAndDrag(RLBenchTask):
     """Take the stick, put its end behind the cube and drag."""
 
     name = "rlbench/reach_and_drag"
+    sizes = (0.8, 1.0)
+    told_by_color = True
     aims = NAMES
     variations = len(NAMES)
     words = (

@@ -21,11 +21,13 @@ class Scene:
         world: where everything is now.
         model: what the file says.
         begun: joint -> position (radians or metres) with which the episode began; the file's for others.
+        scale: of everything over its size in the file, in which the numbers of a task's logic are given.
     """
 
     world: World
     model: Model
     begun: Mapping[str, float] = field(default_factory=dict)
+    scale: float = 1.0
 
     def pose(self, name: str, frame: str | None = None) -> FloatArray:
         """(4, 4) in the world, or in the frame of another object."""
@@ -36,8 +38,8 @@ class Scene:
         return T
 
     def point(self, frame: str, p: tuple[float, float, float]) -> FloatArray:
-        """(3,) in the world, of a point given in the frame of an object."""
-        p_world: FloatArray = (self.pose(frame) @ (*p, 1.0))[:3]
+        """(3,) in the world, of a point given in the frame of an object, in the file's size."""
+        p_world: FloatArray = (self.pose(frame) @ (*(self.scale * c for c in p), 1.0))[:3]
         return p_world
 
     def place(self, name: str, T_world_object: FloatArray) -> None:
@@ -75,7 +77,8 @@ class Scene:
         return {name: self.world.joint(name) for name in names}
 
     def moved(self, joint: str) -> float:
-        """How far a joint is from where the episode began, radians or metres."""
+        """How far a joint is from where the episode began, radians, or metres in the file's size."""
         start = self.model[joint]
         assert isinstance(start, Joint)
-        return abs(self.world.joint(joint) - self.begun.get(joint, start.position))
+        way = abs(self.world.joint(joint) - self.begun.get(joint, start.position))
+        return way / self.scale if start.kind == "prismatic" else way

@@ -12,6 +12,7 @@ class ScoopWithSpatula(RLBenchTask):
     """Take the spatula, slide it under the cube and lift."""
 
     name = "rlbench/scoop_with_spatula"
+    sizes = (0.75, 1.25)
     words = (
         "scoop up the cube and lift it with the spatula",
         "scoop up the block with the spatula",

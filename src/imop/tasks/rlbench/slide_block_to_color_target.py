@@ -16,6 +16,7 @@ class SlideBlockToColorTarget(RLBenchTask):
     """Push with the closed gripper, once or along two sides."""
 
     name = "rlbench/slide_block_to_color_target"
+    told_by_color = True
     aims = TARGETS
     variations = len(TARGETS)
     words = (

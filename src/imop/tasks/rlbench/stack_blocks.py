@@ -21,6 +21,7 @@ class StackBlocks(RLBenchTask):
     """Build a tower on the green base."""
 
     name = "rlbench/stack_blocks"
+    told_by_color = True
     aims = tuple(f"{size} {color}" for color in NAMES for size in SIZES)
     variations = len(NAMES) * len(SIZES)
     words = (
@@ -53,7 +54,8 @@ class StackBlocks(RLBenchTask):
             x, y = scene.pose(block)[:2, 0]
             grasp = se3.make(se3.euler(z=float(np.arctan2(y, x))) @ DOWN, scene.pose(block)[:3, 3])
             T_above = scene.pose("waypoint3")
-            above = se3.make(T_above[:3, :3], scene.pose(base)[:3, 3] + (0, 0, _FIRST + _EACH * k))
+            up = scene.scale * (_FIRST + _EACH * k)
+            above = se3.make(T_above[:3, :3], scene.pose(base)[:3, 3] + (0, 0, up))
             last = k == self.height - 1
             steps += carried(scene, block, "waypoint1", grasp, ("waypoint0", "waypoint1", "waypoint2"))
             after = ("waypoint3", "waypoint4") if last else ("waypoint3", "waypoint4", "waypoint5")

@@ -15,6 +15,8 @@ class StackCups(RLBenchTask):
     """Take the other cups by their rims and let them go over the first."""
 
     name = "rlbench/stack_cups"
+    sizes = (0.75, 1.25)
+    told_by_color = True
     aims = NAMES
     variations = len(NAMES)
     words = (

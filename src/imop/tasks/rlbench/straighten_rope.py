@@ -12,6 +12,7 @@ class StraightenRope(RLBenchTask):
     """Drag each end of the rope onto its mark; it is held by friction alone."""
 
     name = "rlbench/straighten_rope"
+    sizes = None
     words = (
         "straighten rope",
         "pull the rope straight",

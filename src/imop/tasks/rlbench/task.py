@@ -13,10 +13,12 @@ from imop.geometry import se3
 from imop.robots.panda import PANDA_HOME_Q
 from imop.sim.kinematics import inverse_kinematics
 from imop.sim.motion import INSIDE, WORKSPACE_LOWER, Planner
+from imop.sim.resize import resize
 from imop.sim.world import ROBOT, World
 from imop.tasks.checks import settle, touched
 from imop.tasks.coppelia.convert import add_model
 from imop.tasks.coppelia.model import Model, PathObject
+from imop.tasks.coppelia.resized import resized
 from imop.tasks.layout import NoRoom, first_valid
 from imop.tasks.rlbench import assets
 from imop.tasks.rlbench.conditions import Condition
@@ -89,9 +91,12 @@ class RLBenchTask(Task):
         table_friction: coefficient of the table.
         loose: light things that must not jump when something hard pushes them.
         frames: waypoint -> body on which it depends, where that is not the shape it hangs on.
+        scale: of everything in the file.
     """
 
     insist = True
+    sizes: ClassVar[tuple[float, float] | None] = (0.85, 1.15)
+    scale: float = 1.0
     # MuJoCo takes the greater friction of two things, the physics of RLBench the product.
     table_friction: ClassVar[float] = 0.3
     loose: ClassVar[tuple[str, ...]] = ()
@@ -130,12 +135,26 @@ class RLBenchTask(Task):
         """Name of the model file, without .ttm."""
         return cls.name.split("/")[1]
 
+    def resized(self, scale: float) -> Task:
+        self.scale = scale
+        return self
+
     def build(self, spec: Any, variation: int, rng: np.random.Generator) -> None:
         self.variation = variation
         self.model = self.load()
+        before = {body.name for body in spec.worldbody.bodies}
         add_model(spec, self.model)
+        if self.scale != 1.0:
+            self._resize(spec, [body for body in spec.worldbody.bodies if body.name not in before])
         for geom in spec.body("table").geoms:
             geom.friction[0] = self.table_friction
+
+    def _resize(self, spec: Any, bodies: Sequence[Any]) -> None:
+        """Things stay on the plane on which they stand, in the scene and in what the file says of them."""
+        x, y, _ = self.model.T_world_moved[0][:3, 3]
+        on_table = np.array([x, y, WORKSPACE.T_world_area[2, 3]])
+        resize(spec, bodies, self.scale, on_table)
+        self.model = resized(self.model, self.scale, on_table)
 
     def prepare(self, world: World) -> None:
         separate(world, self.model)
@@ -152,7 +171,7 @@ class RLBenchTask(Task):
         return [Step(name) for name in numbered(scene.model)]
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
-        scene = Scene(world, self.model)
+        scene = Scene(world, self.model, scale=self.scale)
         world.unavoided = unavoided(world, self.model)
         for name in self.loose:
             first, body = int(world.model.joint(name).dofadr[0]), world.model.body(name)
@@ -207,14 +226,14 @@ class RLBenchTask(Task):
         return ""
 
     def waypoints(self, world: World) -> Sequence[Waypoint]:
-        scene, opening, found = Scene(world, self.model), 1.0, []
+        scene, opening, found = Scene(world, self.model, scale=self.scale), 1.0, []
         p_before = world.T_world_gripper[:3, 3]
         for step in self.steps(scene):
             words = read_words(self.model[step.waypoint].extension)
             T = scene.pose(step.waypoint) if step.T_world_tip is None else step.T_world_tip
             frame = step.frame or self.frames.get(step.waypoint) or thing_of(self.model, step.waypoint)
             o = self.model[step.waypoint]
-            poses = T @ path_poses(o) if isinstance(o, PathObject) else T[None].copy()
+            poses = T @ path_poses(o, self.scale) if isinstance(o, PathObject) else T[None].copy()
             # RLBench follows paths without a look at what is in the way, whatever their words say.
             free = words.ignore_collisions or isinstance(o, PathObject)
             # Things that sank onto the table may put waypoints below the workspace, by two millimetres.
@@ -236,7 +255,7 @@ class RLBenchTask(Task):
         self.on_step(scene)
 
     def _scene(self, world: World) -> Scene:
-        return Scene(world, self.model, self._begun)
+        return Scene(world, self.model, self._begun, self.scale)
 
     def on_step(self, scene: Scene) -> None:
         """Change what the task changes while it is done, such as a lock; every 0.05 s, nothing by default."""

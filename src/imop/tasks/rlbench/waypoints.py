@@ -47,13 +47,16 @@ def numbered(model: Model) -> list[str]:
     return names
 
 
-def path_poses(path: PathObject) -> FloatArray:
-    """(n, 4, 4) poses along a curve, in its frame, close enough to be reached one after another."""
+def path_poses(path: PathObject, scale: float = 1.0) -> FloatArray:
+    """(n, 4, 4) poses along a curve, in its frame, close enough to be reached one after another.
+
+    There are as many at every `scale` of the curve.
+    """
     points = path.T_path_points
     chosen, last = [], points[0]
     for i, T in enumerate(points[1:], start=1):
         ahead = points[min(i + 1, len(points) - 1)]
-        far = se3.translation_distance(last, ahead) > _PATH_STEP
+        far = se3.translation_distance(last, ahead) > scale * _PATH_STEP
         if far or se3.rotation_distance(last, ahead) > _PATH_TURN or i == len(points) - 1:
             chosen.append(T)
             last = T

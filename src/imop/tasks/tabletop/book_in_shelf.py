@@ -29,6 +29,7 @@ class BookInShelf(TableTask):
     """Grasp the book of the variation's colour and lower it into the gap; another book distracts."""
 
     name = "tabletop/book_in_shelf"
+    told_by_color = True
     variations = len(COLORS)
     graspable = ("book/body", "other/body")
 

@@ -27,6 +27,7 @@ class CloseJar(TableTask):
     """Take the lid by its rim, set it on and turn it a quarter. Done when it is down, turned and released."""
 
     name = "tabletop/close_jar"
+    told_by_color = True
     variations = len(COLORS)
     graspable = ("lid/body",)
 

@@ -29,6 +29,7 @@ class CupOnHook(TableTask):
     """Take the cup by the rim opposite its handle, and bring the handle over the rod from its end."""
 
     name = "tabletop/cup_on_hook"
+    told_by_color = True
     variations = len(COLORS)
     graspable = ("cup/body", "other_cup/body")
 

@@ -33,6 +33,7 @@ class PressButtons(TableTask):
     """Press with the closed gripper from above. Done when these buttons, no others, were pressed in order."""
 
     name = "tabletop/press_buttons"
+    told_by_color = True
     variations = len(COLORS) * len(COUNTS)
 
     def instructions(self, variation: int) -> tuple[str, ...]:

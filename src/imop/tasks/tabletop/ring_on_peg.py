@@ -32,6 +32,7 @@ class RingOnPeg(TableTask):
     """
 
     name = "tabletop/ring_on_peg"
+    told_by_color = True
     variations = len(COLORS)
 
     def instructions(self, variation: int) -> tuple[str, ...]:

@@ -35,6 +35,7 @@ class StackCubes(TableTask):
     """One or two cubes of the variation's colour go onto the plate; cubes of other colours distract."""
 
     name = "tabletop/stack_cubes"
+    told_by_color = True
     variations = len(COLORS) * len(COUNTS)
 
     def instructions(self, variation: int) -> tuple[str, ...]:

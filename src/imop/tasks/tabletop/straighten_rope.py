@@ -44,6 +44,9 @@ class StraightenRope(TableTask):
     """Take each end of the rope and lay it onto the mark of its colour; then the rope lies straight."""
 
     name = "tabletop/straighten_rope"
+    told_by_color = True
+    sizes = None
+    sizes = None
 
     def instructions(self, variation: int) -> tuple[str, ...]:
         return (

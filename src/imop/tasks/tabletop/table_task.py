@@ -3,7 +3,7 @@
 # ruff: noqa: D102 (the methods are described in Task)
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -18,6 +18,13 @@ _ATTEMPTS = 150
 
 class TableTask(Task):
     """A task that says what is to be placed: without overlap, at rest, and within the arm's reach."""
+
+    sizes: ClassVar[tuple[float, float] | None] = (0.85, 1.15)
+
+    def resized(self, scale: float) -> Task:
+        from imop.tasks.tabletop.resized import Resized  # which is a table task itself
+
+        return Resized(self, scale)
 
     @abstractmethod
     def items(self) -> Sequence[Item]:

@@ -33,6 +33,11 @@ class DepthNoise:
     lose_view: float = 0.0
 
     @classmethod
+    def of_d415(cls) -> "DepthNoise":
+        """As bad as a D415 at two metres in a plain room: the worst that training sees, with no view lost."""
+        return cls(0.06, 0.05, 0.5, 0.05)
+
+    @classmethod
     def sample(cls, rng: np.random.Generator) -> "DepthNoise":
         """Clean half of the time, else anything up to a real camera's."""
         lose = 0.1
