@@ -8,6 +8,7 @@ import torch
 
 from imop.errors import CorruptData, ImopError, InvalidInput, NoConfidentMatch
 from imop.geometry import se3
+from imop.geometry.view_alignment import corrected, find_errors
 from imop.networks.model import Model, ModelConfig, save_model
 from imop.policy.learned_router import LearnedRouter
 from imop.policy.one_shot import OneShotPolicy
@@ -40,6 +41,27 @@ def test_poses_are_transferred_to_another_scene(policy, shown, wanted):
         assert action.allow_collisions == demonstrated.action.allow_collisions
         assert action.confidence > 0.5
         assert action.match.step == number and len(action.match.p_query) > 50
+
+
+def test_exact_cameras_are_left_alone_in_every_state(shown, wanted):
+    for demonstration in (shown, wanted):
+        for observation in (*(k.observation for k in demonstration.keyframes), demonstration.final):
+            for name, T in find_errors([observation]).items():
+                assert np.array_equal(T, np.eye(4)), name
+
+
+def test_cameras_with_wrong_poses_are_corrected_alike_in_demonstration_and_test(perception, shown, wanted):
+    rng = np.random.default_rng(0)
+    wrong = {
+        name: se3.make(se3.euler(*rng.normal(0, np.radians(0.5), 3)), rng.normal(0, 0.003, 3))
+        for name in shown.final.views
+    }
+    steps = [replace(k, observation=corrected(k.observation, wrong)) for k in shown.keyframes]
+    policy = OneShotPolicy(RegistrationMatcher(), perception)
+    policy.watch(replace(shown, keyframes=tuple(steps), final=corrected(shown.final, wrong)).stripped())
+    action = policy.act(corrected(wanted.keyframes[0].observation, wrong).stripped())
+    expert = wanted.keyframes[0].action.T_world_gripper
+    assert se3.translation_distance(action.T_world_gripper, expert) < 0.01
 
 
 def test_matched_points_lie_in_the_scene_and_move_rigidly(policy, shown, wanted):

@@ -51,6 +51,8 @@ class Perception:
         voxel: edge of the grid, metres.
         max_points: more are thinned by farthest point sampling.
         lower, upper: (3,) bounds of the workspace, metres.
+        align_views: whether a policy corrects the cameras' poses where views disagree, see `view_alignment`;
+            the cloud of an observation is made with the poses that the observation says.
     """
 
     robot_mask: RobotMask | None = None
@@ -58,6 +60,7 @@ class Perception:
     max_points: int = 60_000
     lower: tuple[float, float, float] = WORKSPACE_LOWER
     upper: tuple[float, float, float] = WORKSPACE_UPPER
+    align_views: bool = True
 
     def __call__(self, observation: Observation) -> PointCloud:
         """The scene around the robot, with normals; raises as `points` does."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from imop.errors import CorruptData, InvalidInput, NoConfidentMatch
 from imop.geometry.perception import Perception
+from imop.geometry.view_alignment import corrected, find_errors
 from imop.networks.model import BUNDLED, load_model
 from imop.policy.hypotheses import confidence
 from imop.policy.learned import LearnedMatcher
@@ -55,6 +56,7 @@ class OneShotPolicy:
         self._demonstrations: list[list[Transition]] = []
         self._prepared: list[list[PreparedStep]] = []
         self._cameras: set[str] = set()
+        self._camera_errors: dict[str, FloatArray] = {}
         self._hints: list[FloatArray] = []
 
     @classmethod
@@ -95,7 +97,11 @@ class OneShotPolicy:
             InvalidInput: if an observation has no usable depth.
         """
         observations = [keyframe.observation for keyframe in demonstration.keyframes]
-        scenes = [self._scene(observation) for observation in [*observations, demonstration.final]]
+        seen = [*observations, demonstration.final]
+        if self._perception.align_views:
+            # One set-up has one calibration: all that is shown tells of it.
+            self._camera_errors |= find_errors(seen, self._camera_errors)
+        scenes = [self._scene(observation) for observation in seen]
         steps = [
             Transition(before, after, keyframe.action)
             for before, after, keyframe in zip(scenes, scenes[1:], demonstration.keyframes, strict=False)
@@ -146,6 +152,9 @@ class OneShotPolicy:
         return next(able, hypotheses[0])
 
     def _scene(self, observation: Observation) -> Scene:
+        if self._perception.align_views:
+            # A camera may have been knocked since; else the errors stay as they are.
+            observation = corrected(observation, find_errors([observation], self._camera_errors))
         return Scene(observation, self._perception.points(observation))
 
 

@@ -9,6 +9,7 @@ import torch
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud
 from imop.networks.graph import Graph
+from imop.training.camera_error import camera_errors
 from imop.training.pairs import StepPair
 from imop.types import BoolArray, FloatArray
 
@@ -26,10 +27,11 @@ def augment(pair: StepPair, rng: np.random.Generator) -> StepPair:
 
     Both sides turn freely about the vertical, move by up to `MOVE` metres and tilt by up to `TILT` radians;
     poses, normals and the right motions go with them. Half of all pairs are mirrored first. Colours change
-    together and a little apart; points and whole views are lost.
+    together and a little apart; points and whole views are lost; views are a little off.
     """
     if rng.random() < 0.5:
         pair = mirrored(pair)
+    pair = camera_errors(pair, rng)
     A, B = _motion(rng, pair.T_world_goal[:3, 3]), _motion(rng, pair.query.points.mean(axis=0))
     light = random_light(rng, 0.25)
     support, kept = _worse(pair.support, rng, pair.region)
