@@ -21,9 +21,10 @@ from rich.console import Console
 from rich.table import Table
 
 from imop.errors import ImopError, InvalidInput
+from imop.evaluation.benchmark import shown_together
 from imop.evaluation.causes import Cause, Diagnosis, diagnose
 from imop.evaluation.episodes import read_episodes
-from imop.evaluation.jobs import parallel, shown_together
+from imop.evaluation.jobs import parallel
 from imop.evaluation.picture import save_picture
 from imop.evaluation.trials import Trial, demonstration_for
 from imop.files import replaced

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import pytest
 
 from imop.errors import CorruptData
@@ -16,6 +18,17 @@ def test_what_was_added_is_found_again(tmp_path):
     assert again.find(TRIAL, "replay", "s") == episode
     assert again.find(TRIAL, "replay", "other code") is None
     assert again.find(Trial(TRIAL.task, 4, 1, 2), "replay", "s") is None
+    assert again.find(replace(TRIAL, change="light"), "replay", "s") is None
+
+
+def test_scenes_that_were_changed_are_told_from_others_and_older_lines_are_read(tmp_path):
+    path = tmp_path / "episodes.jsonl"
+    changed = Episode(replace(TRIAL, change="light,d415"), "replay", "s", True, "success", 3)
+    EpisodeLog(path).add(changed)
+    path.write_text(path.read_text() + path.read_text().replace(', "change": "light,d415"', ""))
+    log = EpisodeLog(path)
+    assert log.find(replace(TRIAL, change="d415,light"), "replay", "s") == changed
+    assert log.find(TRIAL, "replay", "s") == replace(changed, trial=TRIAL)
 
 
 def test_a_line_that_was_cut_off_is_tried_again_and_the_others_stay(tmp_path):

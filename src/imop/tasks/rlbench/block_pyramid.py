@@ -21,6 +21,7 @@ class BlockPyramid(RLBenchTask):
     """Three blocks in a row, two on these, one on top."""
 
     name = "rlbench/block_pyramid"
+    sizes = (0.85, 1.0)
     told_by_color = True
     words = (
         "stack {} blocks in a pyramid",

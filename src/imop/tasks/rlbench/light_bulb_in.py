@@ -17,6 +17,7 @@ class LightBulbIn(RLBenchTask):
     """Take the bulb out of its holder, put it into the socket, turn and let go."""
 
     name = "rlbench/light_bulb_in"
+    sizes = (0.85, 1.0)
     told_by_color = True
     aims = NAMES
     variations = len(NAMES)

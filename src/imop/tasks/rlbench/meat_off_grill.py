@@ -16,6 +16,7 @@ class MeatOffGrill(RLBenchTask):
     """Grasp the variation's meat and put it down beside the grill."""
 
     name = "rlbench/meat_off_grill"
+    sizes = (0.85, 1.0)
     words = (
         "take the {} off the grill",
         "pick up the {} and place it next to the grill",

@@ -17,6 +17,7 @@ class PlaceCups(RLBenchTask):
     """Take one to three cups from the table and push their handles onto the spokes."""
 
     name = "rlbench/place_cups"
+    sizes = (0.85, 1.0)
     aims = ("1 cup", "2 cups", "3 cups")
     variations = len(aims)
     words = (

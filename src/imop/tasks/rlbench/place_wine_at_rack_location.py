@@ -17,6 +17,7 @@ class PlaceWineAtRackLocation(RLBenchTask):
     """Take the bottle by its neck and slide it into the variation's slot."""
 
     name = "rlbench/place_wine_at_rack_location"
+    sizes = (0.85, 1.0)
     aims = PLACES
     variations = len(PLACES)
     words = (

@@ -27,6 +27,7 @@ class PutGroceriesInCupboard(RLBenchTask):
     """Take the variation's thing from among the others and leave it in the cupboard."""
 
     name = "rlbench/put_groceries_in_cupboard"
+    sizes = (0.85, 1.0)
     words = (
         "put the {} in the cupboard",
         "pick up the {} and place it in the cupboard",

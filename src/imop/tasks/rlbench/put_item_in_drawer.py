@@ -17,6 +17,7 @@ class PutItemInDrawer(RLBenchTask):
     """Pull the variation's drawer, then fetch the block from the top of the cabinet."""
 
     name = "rlbench/put_item_in_drawer"
+    sizes = (0.85, 1.0)
     aims = LEVELS
     variations = len(LEVELS)
     words = (

@@ -14,6 +14,7 @@ class PutRubbishInBin(RLBenchTask):
     """Take the crumpled paper, not the tomatoes, and drop it into the bin."""
 
     name = "rlbench/put_rubbish_in_bin"
+    sizes = (0.85, 1.0)
     words = (
         "put rubbish in bin",
         "drop the rubbish into the bin",

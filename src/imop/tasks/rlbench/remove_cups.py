@@ -20,6 +20,7 @@ class RemoveCups(RLBenchTask):
     """Pull one or two cups off their spokes and put them down on the table."""
 
     name = "rlbench/remove_cups"
+    sizes = (0.85, 1.0)
     words = (
         "remove {} from the cup holder",
         "remove {} from the cup holder and place it on the table",

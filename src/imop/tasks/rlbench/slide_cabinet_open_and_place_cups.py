@@ -22,6 +22,7 @@ class SlideCabinetOpenAndPlaceCups(RLBenchTask):
     """Slide the variation's door and leave the cup behind it."""
 
     name = "rlbench/slide_cabinet_open_and_place_cups"
+    sizes = (0.85, 1.0)
     words = (
         "put the cup in the {} cabinet",
         "slide the {} cabinet open and place the cup inside",

@@ -21,6 +21,7 @@ class StackBlocks(RLBenchTask):
     """Build a tower on the green base."""
 
     name = "rlbench/stack_blocks"
+    sizes = (0.85, 1.0)
     told_by_color = True
     aims = tuple(f"{size} {color}" for color in NAMES for size in SIZES)
     variations = len(NAMES) * len(SIZES)

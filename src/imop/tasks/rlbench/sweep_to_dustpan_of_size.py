@@ -15,6 +15,7 @@ class SweepToDustpanOfSize(RLBenchTask):
     """Take the broom and sweep."""
 
     name = "rlbench/sweep_to_dustpan_of_size"
+    sizes = (0.85, 1.0)
     aims = PANS
     variations = len(PANS)
     words = (

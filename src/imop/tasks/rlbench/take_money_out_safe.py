@@ -18,6 +18,7 @@ class TakeMoneyOutSafe(RLBenchTask):
     """Take the variation's stack and lay it down on the table."""
 
     name = "rlbench/take_money_out_safe"
+    sizes = (0.85, 1.0)
     words = (
         "take the money out of the {} shelf and place it on the table",
         "take the stack of money out of the {} shelf and place it on the table",

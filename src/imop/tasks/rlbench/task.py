@@ -95,6 +95,7 @@ class RLBenchTask(Task):
     """
 
     insist = True
+    # Tasks whose files would be too large for the workspace say less, see `_place`.
     sizes: ClassVar[tuple[float, float] | None] = (0.85, 1.15)
     scale: float = 1.0
     # MuJoCo takes the greater friction of two things, the physics of RLBench the product.

@@ -16,6 +16,7 @@ class TurnTap(RLBenchTask):
     """Grip the variation's handle and turn it."""
 
     name = "rlbench/turn_tap"
+    sizes = (0.85, 1.0)
     words = (
         "turn the {} tap",
         "rotate the {} tap",
