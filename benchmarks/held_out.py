@@ -26,6 +26,7 @@ from rich.console import Console
 from rich.table import Table
 
 from imop.evaluation.statistics import wilson
+from imop.evaluation.textbook import TextbookMatcher
 from imop.geometry import se3
 from imop.geometry.accuracy import COARSE, FINE, errors
 from imop.geometry.cloud import PointCloud
@@ -36,7 +37,6 @@ from imop.policy.learned import LearnedMatcher
 from imop.policy.matcher import Matcher, Transition
 from imop.policy.matcher import Scene as Seen
 from imop.policy.registration import RegistrationMatcher
-from imop.policy.textbook import TextbookMatcher
 from imop.robots.panda import panda_self_filter
 from imop.training.families import HELD_OUT
 from imop.training.families.thing import revolution
@@ -95,7 +95,8 @@ def observe(scene: Scene, rng: np.random.Generator) -> tuple[Take, list[Observat
     observations = [scene.stage.observe(state, noise, rng) for state in states]
     poses = tuple(scene.stage.link_poses(state) for state in states)
     clouds = tuple(perception(observation) for observation in observations)
-    return Take(tuple(states), clouds, poses), [observation.stripped() for observation in observations]
+    take = Take(tuple(states), tuple(observations), clouds, poses)
+    return take, [observation.stripped() for observation in observations]
 
 
 def transitions(take: Take, observations: list[Observation]) -> list[Transition]:
@@ -166,8 +167,8 @@ def scene_rows(number: int, seed: int, methods: tuple[str, ...], weights: Path) 
         (shown, watched), (asked, seen) = observe(scene, rng), observe(scene, rng)
     except Unreachable:
         return []
-    made = [(k, make_pair(scene, shown, asked, k)) for k in range(len(scene.recipe.steps))]
-    pairs = [(k, with_every_turn(scene, shown, k, pair)) for k, pair in made if pair is not None]
+    made = [make_pair(scene, shown, asked, k) for k in range(len(scene.recipe.steps))]
+    pairs = [(e.step, with_every_turn(scene, shown, e.step, e.pair)) for e in made if e is not None]
     steps = transitions(shown, watched)
     queries = [Seen(observation, plain(asked, k)) for k, observation in enumerate(seen)]
     rows: list[Row] = []

@@ -24,7 +24,7 @@ from rich.table import Table
 
 from imop.evaluation.statistics import wilson
 from imop.networks.model import BUNDLED, Model, load_model
-from imop.policy.learned_router import Odds, prior
+from imop.policy.router import Odds, prior
 from imop.training.route_batch import make_route_sample
 from imop.training.route_shards import RouteShard
 from imop.training.routes import Route

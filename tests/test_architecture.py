@@ -1,4 +1,4 @@
-"""Arrows point one way: types <- geometry <- demos <- networks <- policy <- evaluation <- cli."""
+"""Arrows point one way: types <- geometry <- demos <- networks <- policy <- candidates <- training <- evaluation <- cli."""
 
 import ast
 from pathlib import Path
@@ -20,9 +20,21 @@ ALLOWED = {
     "robots": BASE | {"geometry"},
     "sim": BASE | {"geometry", "robots"},
     "tasks": BASE | {"geometry", "robots", "sim", "plugins"},
-    "training": BASE | {"geometry", "demos", "networks", "robots", "sim"},
+    "candidates": BASE | {"geometry", "networks", "policy"},
+    "training": BASE | {"geometry", "demos", "networks", "policy", "candidates", "robots", "sim"},
     "evaluation": BASE
-    | {"geometry", "demos", "networks", "policy", "training", "robots", "sim", "tasks", "plugins"},
+    | {
+        "geometry",
+        "demos",
+        "networks",
+        "policy",
+        "candidates",
+        "training",
+        "robots",
+        "sim",
+        "tasks",
+        "plugins",
+    },
 }
 
 
@@ -49,7 +61,7 @@ def test_nobody_imports_the_command_line():
     assert not [p for p in SOURCE.rglob("*.py") if "cli" in set(imports(p))]
 
 
-@pytest.mark.parametrize("package", ["policy", "networks"])
+@pytest.mark.parametrize("package", ["policy", "candidates", "networks"])
 def test_policies_name_no_task_and_no_privileged_field(package):
     words = ("open_drawer", "stack_cubes", "lid_off_pot", "rubbish_in_bin", "instance_ids", "instance_names")
     words += ("object_name", "T_world_object", "joint_velocities", ".task", ".ids")

@@ -3,9 +3,9 @@ from .demos.store import DemonstrationStore
 from .errors import ImopError, InvalidInput, NoConfidentMatch, PlanFailed
 from .geometry.perception import Perception
 from .policy.learned import LearnedMatcher
-from .policy.learned_router import LearnedRouter
 from .policy.one_shot import OneShotPolicy
 from .policy.registration import RegistrationMatcher
+from .policy.router import LearnedRouter
 from .robots.panda import panda_self_filter
 from .tasks.check_task import check_task
 from .tasks.env import make_env, make_task, to_array, to_observation

@@ -157,6 +157,7 @@ def evaluate(
     episodes: int = 25,
     seed: int = 0,
     instance: int = 0,
+    instances: Literal["same", "other"] = "same",
     change: Annotated[str, tyro.conf.arg(metavar="FACTOR,FACTOR")] = "",
     jobs: int = 2,
     weights: Path | None = None,
@@ -173,11 +174,13 @@ def evaluate(
         split: base, novel, cross_object or all.
         tasks: names within the split; all if none is given.
         methods: any of replay, textbook (FPFH, RANSAC and ICP of Open3D, extra baselines), registration,
-            learned, routed (learned, and the routing network may go back to a step), oracle (true object
-            poses), expert, or one's own (my_methods:MyPolicy), joined by commas.
+            learned, routed (learned, and the routing network may go back to a step), verified (candidates of
+            every generator and one learned verification), oracle (true object poses), expert, or one's own
+            (my_methods:MyPolicy), joined by commas.
         episodes: scenes per task, spread over its variations.
         seed: first seed of the scenes.
-        instance: seed of the objects' shapes, sizes and colours.
+        instance: seed of the demonstrated objects' shapes, sizes and colours.
+        instances: whether the scenes show the same objects, or in each scene others of their kind.
         change: what the scenes differ in from the demonstrated ones, joined by commas: object_color,
             object_size, light, table_color, distractors, camera_pose, or all of these as all; errors of the
             sensors d415, calibration, knocked, fewer_cameras. docs/tasks.md says what they are.
@@ -190,7 +193,19 @@ def evaluate(
     writable_folder(out)
     log = out / "episodes.jsonl"
     results = evaluate_suite(
-        suite, split, tasks, methods.split(","), episodes, seed, instance, jobs, console, log, weights, change
+        suite,
+        split,
+        tasks,
+        methods.split(","),
+        episodes,
+        seed,
+        instance,
+        jobs,
+        console,
+        log,
+        weights,
+        change,
+        instances,
     )
     results.save(out)
     console.print(results.table())

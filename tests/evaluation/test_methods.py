@@ -5,7 +5,7 @@ from imop.evaluation.methods import make_policy
 
 MODULE = """
 import functools
-from imop.policy.baselines import ReplayPolicy
+from imop.evaluation.replay import ReplayPolicy
 
 def after(number):
     return ReplayPolicy()

@@ -9,12 +9,12 @@ from imop.evaluation.appearance import Appearance
 from imop.evaluation.open_loop import Case, ToldRouter, ask, region_iou
 from imop.evaluation.oracle import OraclePolicy
 from imop.evaluation.recordings import objects_world
+from imop.evaluation.replay import ReplayPolicy
 from imop.evaluation.trials import Trial
 from imop.geometry import cloud as clouds
 from imop.geometry import se3
 from imop.geometry.accuracy import COARSE, FINE
 from imop.geometry.perception import Perception
-from imop.policy.baselines import ReplayPolicy
 from imop.policy.matcher import Hypothesis
 from imop.policy.one_shot import OneShotPolicy
 from imop.tasks.env import make_task

@@ -1,7 +1,9 @@
 import pytest
 
 from imop.errors import InvalidInput
+from imop.evaluation.benchmark import shown_together
 from imop.evaluation.methods import make_policy
+from imop.evaluation.oracle import OraclePolicy
 from imop.evaluation.rollout import rollout
 from imop.evaluation.trials import DEMONSTRATION_SEED, Trial, change_notes, demonstration_for, suite_trials
 
@@ -40,3 +42,25 @@ def test_a_missing_camera_is_missing_in_demonstration_and_test_and_no_policy_min
     policy = make_policy("registration")
     policy.watch(shown.stripped())
     assert rollout(env, policy, len(shown)).success
+
+
+def test_other_instances_are_shown_one_and_tried_with_others():
+    same, other = (
+        suite_trials("tabletop", "all", ("lid_off_pot",), 3, 5, 2, other=wanted)["lid_off_pot"]
+        for wanted in (False, True)
+    )
+    assert [t.instance for t in same] == [2, 2, 2] and [t.seed for t in other] == [5, 6, 7]
+    assert len({t.instance for t in other} | {2}) == 4
+    assert {t.shown_instance for t in (*same, *other)} == {2}
+    assert len({shown_together(t) for t in (*same, *other)}) == 1
+    with pytest.raises(InvalidInput, match="rlbench") as error:
+        suite_trials("rlbench", "all", ("open_drawer",), 1, 0, 0, other=True)
+    assert error.value.field == "instances"
+
+
+def test_the_oracle_carries_poses_over_to_another_rope():
+    trial = Trial("tabletop/straighten_rope", 3, 0, 7, shown=0)
+    env = trial.env()
+    policy = OraclePolicy(env.world)
+    policy.watch(demonstration_for(trial))
+    assert rollout(env, policy, env.task.step_limit).success

@@ -3,8 +3,8 @@
 import numpy as np
 
 from imop.geometry import se3
+from imop.geometry.clusters import find_objects
 from imop.policy.contacts import find_contacts
-from imop.policy.objects import find_objects
 from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, moved, scene, transitions
 
 CUBE = (0.05, 0.05, 0.05)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from imop.geometry import se3
+from imop.geometry.clusters import find_objects
 from imop.policy.inquiry import Inquiry
-from imop.policy.objects import find_objects
 from imop.policy.region import Region
 from imop.policy.search import Search, SearchConfig
 from imop.policy.things import Things

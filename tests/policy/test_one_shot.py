@@ -10,10 +10,9 @@ from imop.errors import CorruptData, ImopError, InvalidInput, NoConfidentMatch
 from imop.geometry import se3
 from imop.geometry.view_alignment import corrected, find_errors
 from imop.networks.model import Model, ModelConfig, save_model
-from imop.policy.learned_router import LearnedRouter
 from imop.policy.one_shot import OneShotPolicy
 from imop.policy.registration import RegistrationMatcher
-from imop.policy.router import AdvancingRouter
+from imop.policy.router import AdvancingRouter, LearnedRouter
 
 
 def with_depth(observation, depth):

@@ -1,9 +1,22 @@
-"""The advancing router."""
+"""The routers: steps that follow each other, and the learned rule, with a stand-in for the network."""
 
-from imop.policy.router import AdvancingRouter
-from tests.policy.scenes import above, scene, transitions
+from itertools import combinations
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from imop.geometry import se3
+from imop.networks.graph import GraphConfig
+from imop.networks.model import Model, ModelConfig
+from imop.policy.router import AdvancingRouter, LearnedRouter, Odds, prior
+from tests.networks.test_routing import ROUTING
+from tests.policy.scenes import BLUE, RED, above, at, box, moved, scene, transitions
 
 HOME = above(0, 0, 1)
+LENGTH = 4
 STATE = scene([], HOME)
 STEPS = transitions([STATE] * 4, [(HOME, True)] * 3)
 
@@ -28,3 +41,133 @@ def test_the_first_demonstration_counts():
     for _ in range(2):
         router.took(*router.route(STATE))
     assert router.route(STATE) == (0, 2)
+
+
+class Told(LearnedRouter):
+    """Hears the network's probabilities from the test."""
+
+    def __init__(self, odds=None):
+        super().__init__(None, odds)
+        self.probabilities = None
+
+    def scores(self, query):
+        return [np.log(np.asarray(p, dtype=float)) for p in self.probabilities]
+
+    def go(self, *probabilities):
+        self.probabilities = probabilities
+        found = self.route(None)
+        assert found == self.route(None)
+        self.took(*found)
+        return found
+
+
+UNSURE = np.full(LENGTH, 1 / LENGTH)
+
+
+def sure(step, doubt=1e-6):
+    p = np.full(LENGTH, doubt)
+    p[step] = 1.0
+    return p
+
+
+def test_states_that_look_the_same_follow_each_other_and_the_last_stays():
+    router = Told()
+    assert [router.go(UNSURE)[1] for _ in range(5)] == [0, 1, 2, 3, 3]
+    router.reset()
+    assert router.go(UNSURE) == (0, 0)
+
+
+def test_a_slight_doubt_changes_nothing():
+    """The network has to be five to one for a step before, and surer for a later one."""
+    router = Told()
+    for step in range(LENGTH):
+        doubtful = np.full(LENGTH, 1.0)
+        doubtful[step] = 0.25
+        assert router.go(doubtful) == (0, step)
+
+
+def test_a_failed_grasp_is_repeated():
+    router = Told()
+    seen = [router.go(sure(step))[1] for step in (0, 1, 0, 1, 2, 3)]
+    assert seen == [0, 1, 0, 1, 2, 3]
+
+
+def test_it_goes_on_after_its_retries():
+    router = Told(odds=Odds(retries=2))
+    seen = [router.go(sure(0))[1] for _ in range(7)]
+    assert seen[:3] == [0, 0, 0] and 0 not in seen[3:] and seen[-1] == LENGTH - 1
+
+
+def test_what_is_done_already_is_skipped_only_with_certainty():
+    assert Told().go(sure(2, 1e-5)) == (0, 2)
+    assert Told().go(sure(2, 1e-2)) == (0, 0)
+
+
+def test_the_demonstration_that_fits_is_followed():
+    router = Told()
+    assert router.go(0.1 * sure(0), sure(0)) == (1, 0)
+    assert router.go(sure(1), 0.3 * sure(1)) == (1, 1)
+    assert router.go(sure(2), 1e-3 * sure(2)) == (0, 2)
+
+
+@given(st.lists(st.integers(0, LENGTH - 1), min_size=1, max_size=40))
+def test_an_episode_ends(steps):
+    """Whatever is seen, no step is repeated for ever but the last."""
+    router = Told()
+    taken = [router.go(sure(step, 1e-9))[1] for step in steps]
+    assert all(taken.count(step) <= LENGTH * (Odds().retries + 1) for step in range(LENGTH - 1))
+    assert len(taken) < 4 * LENGTH * (Odds().retries + 1) or taken[-1] == LENGTH - 1
+
+
+@pytest.fixture(scope="module")
+def router():
+    torch.manual_seed(0)
+    router = LearnedRouter(Model(ModelConfig(routing=ROUTING, route_graph=GraphConfig(max_points=60))).eval())
+    router.watch(transitions(STATES, [(HOME, True)] * 3))
+    return router
+
+
+STATES = [
+    scene([box((0.05,) * 3, RED, at(0.1 * i, 0))], above(0, 0, 1 - 0.05 * i), 1 - 0.3 * i) for i in range(4)
+]
+
+
+def test_the_network_is_asked_about_every_demonstrated_step(router):
+    (scores,) = router.scores(STATES[0])
+    assert scores.shape == (3,) and np.isfinite(scores).all()
+
+
+def test_it_knows_what_was_seen_before_the_last_action(router):
+    router.reset()
+    fresh = router.scores(STATES[1])[0]
+    found = [fresh]
+    for before in (STATES[0], STATES[3]):
+        router.reset()
+        router.route(before)
+        np.testing.assert_array_equal(router.scores(STATES[1])[0], fresh)
+        router.took(0, 0)
+        found.append(router.scores(STATES[1])[0])
+    router.reset()
+    assert all(np.abs(a - b).max() > 1e-4 for a, b in combinations(found, 2))
+
+
+def test_odds_of_steps():
+    odds = Odds(back=0.2, skip=0.01)
+    np.testing.assert_allclose(prior(odds, 1, 4), [0.2, 1, 0.01, 0.01])
+    np.testing.assert_allclose(prior(odds, 4, 4), [0.2, 0.2, 0.2, 1])
+
+
+def test_time_steps_are_not_read(router):
+    later = scene([box((0.05,) * 3, BLUE, at(0.1, 0))], above(0, 0, 0.9))
+    first = router.scores(later)[0]
+    object.__setattr__(later.observation, "time_step", 7)
+    np.testing.assert_array_equal(router.scores(later)[0], first)
+
+
+def test_it_does_not_matter_where_a_state_stands(router):
+    """Clouds are thinned on a grid of 2 cm, so that scores change a little."""
+    T = se3.make(se3.euler(z=0.8), (0.1, 0.05, 0))
+    here = scene([box((0.06,) * 3, RED, at(0.1, 0))], above(0.1, 0, 0.9))
+    there = scene([moved(box((0.06,) * 3, RED, at(0.1, 0)), T)], T @ above(0.1, 0, 0.9))
+    a, b = router.scores(here)[0], router.scores(there)[0]
+    np.testing.assert_allclose(a - a.mean(), b - b.mean(), atol=0.1)

@@ -10,7 +10,7 @@ from imop.errors import AssetMissing, ImopError, MissingExtra
 from imop.evaluation.episodes import Episode, EpisodeLog, method_state
 from imop.evaluation.jobs import parallel
 from imop.evaluation.methods import make_policy
-from imop.evaluation.report import Count, Results
+from imop.evaluation.report import Count, Instances, Results
 from imop.evaluation.rollout import rollout
 from imop.evaluation.trials import Trial, change_notes, demonstration_for, most_actions, suite_trials
 from imop.tasks.expert import perform
@@ -20,13 +20,18 @@ from imop.types import Demonstration
 NOTES = (
     "One demonstration per task and variation, from a scene that is never tested.",
     "The networks of learned saw synthetic pairs and base tasks with other objects; others saw nothing.",
-    "Demonstrated and tested objects have the same shapes and colours, unless they are changed; poses and "
-    "clutter differ.",
     "replay, registration and learned see four 128 x 128 RGB-D views, camera poses, joint positions and "
     "the gripper; no segmentation, names or object poses.",
     "oracle carries the demonstrated poses over by the true object pose; expert reads everything.",
     "A motion that cannot be planned ends the episode as failed.",
 )
+
+
+SAME = (
+    "Demonstrated and tested objects have the same shapes and colours, unless they are changed; poses and "
+    "clutter differ."
+)
+OTHER = "Every scene shows other objects of the demonstrated kind: shapes, sizes and colours are drawn anew."
 
 
 def evaluate_suite(
@@ -42,6 +47,7 @@ def evaluate_suite(
     log: Path,
     weights: Path | None = None,
     change: str = "",
+    instances: Instances = "same",
 ) -> Results:
     """Try every method in the same `episodes` scenes of every task.
 
@@ -58,12 +64,14 @@ def evaluate_suite(
         log: file of episodes; what is in it is not tried again.
         weights: of the learned policy; None for the bundled ones.
         change: what the scenes differ in, names of `tasks.changes.FACTORS` joined by commas.
+        instances: whether the scenes show the demonstrated objects or others of their kind.
 
     Raises:
-        InvalidInput: for an unknown suite, split, task, method or change.
+        InvalidInput: for an unknown suite, split, task, method or change, or other instances where there are
+            none.
         CorruptData: if the log cannot be read.
     """
-    trials = suite_trials(suite, split, tasks, episodes, seed, instance, change)
+    trials = suite_trials(suite, split, tasks, episodes, seed, instance, change, instances == "other")
     for method in methods:
         if method not in ("oracle", "expert"):
             make_policy(method, weights=weights)  # what is missing is said before anything is tried
@@ -91,7 +99,8 @@ def evaluate_suite(
         for method in methods
     }
     names = ",".join(tasks) or split
-    return Results(suite, names, seed, counts, (*NOTES, *change_notes(trials, change)), change)
+    notes = (*NOTES, OTHER if instances == "other" else SAME, *change_notes(trials, change))
+    return Results(suite, names, seed, counts, notes, change, instances)
 
 
 def attempt(
@@ -124,7 +133,7 @@ def _count(episodes: list[Episode | None]) -> Count:
 
 def shown_together(trial: Trial) -> tuple[str, int, int, str]:
     """What trials with the same demonstration have in common."""
-    return trial.task, trial.variation, trial.instance, trial.change
+    return trial.task, trial.variation, trial.shown_instance, trial.change
 
 
 def _demonstrations(

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import dacite
 
+import imop.candidates
 import imop.demos
+import imop.evaluation.textbook
 import imop.geometry
 import imop.networks
 import imop.policy
@@ -74,8 +76,9 @@ def method_state(method: str, weights: Path | None, task: str) -> str:
     """Digest of the code that decides how a method does in a task, and of its weights if it has some."""
     digests = [code_digest(imop.sim, imop.robots, imop.tasks, imop.geometry)]
     if method not in ("expert", "oracle", "replay"):
-        digests.append(code_digest(imop.policy, imop.networks, imop.demos))
-    if method in ("learned", "routed"):
+        deciding = imop.policy, imop.candidates, imop.networks, imop.demos, imop.evaluation.textbook
+        digests.append(code_digest(*deciding))
+    if method in ("learned", "verified", "routed"):
         digests.append(weights_digest(weights or BUNDLED))
     own = [find_task(task)] + ([] if method in METHODS else [find_method(method)])
     return "-".join([*digests, *own_code_digest(*own)])

@@ -9,13 +9,14 @@ from typing import Any
 from imop.networks.model import WEIGHTS
 
 
-def code_digest(*packages: ModuleType) -> str:
-    """Of the source files of packages."""
+def code_digest(*modules: ModuleType) -> str:
+    """Of the source files of packages, and of single modules."""
     digest = hashlib.sha256()
-    for package in packages:
-        for folder in package.__path__:
-            for file in sorted(Path(folder).rglob("*.py")):
-                digest.update(file.read_bytes())
+    for module in modules:
+        folders = [Path(folder) for folder in getattr(module, "__path__", ())]
+        files = [file for folder in folders for file in sorted(folder.rglob("*.py"))]
+        for file in files or [Path(str(module.__file__))]:
+            digest.update(file.read_bytes())
     return digest.hexdigest()[:12]
 
 

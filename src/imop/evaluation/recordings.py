@@ -2,7 +2,7 @@
 
 import json
 import re
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +49,7 @@ class Recordings:
 
     def scene(self, trial: Trial) -> Demonstration | None:
         """What the expert does in the trial's scene; None if it fails there."""
+        trial = replace(trial, shown=None)  # what was demonstrated does not change the scene
         if trial in self._numbers:
             return self._store[self._numbers[trial]]
         failure = self._failed / "-".join(re.sub(r"\W", "_", str(v)) for v in asdict(trial).values())
@@ -70,7 +71,7 @@ class Recordings:
         Raises:
             ExpertFailed, NoRoom: as `demonstration_for`.
         """
-        wanted = (trial.task, trial.variation, trial.instance)
+        wanted = (trial.task, trial.variation, trial.shown_instance)
         for known, number in self._numbers.items():
             if known.seed >= DEMONSTRATION_SEED and (known.task, known.variation, known.instance) == wanted:
                 return self._store[number]

@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from rich.table import Table
 
@@ -29,6 +29,10 @@ class Count:
         return f"{100 * self.rate:.0f} % [{100 * low:.0f}, {100 * high:.0f}]"
 
 
+Instances = Literal["same", "other"]
+"""Of the objects in a test scene, against the demonstrated ones."""
+
+
 @dataclass(frozen=True)
 class Results:
     """Counts of every method on every task of a suite, on the same scenes.
@@ -40,6 +44,7 @@ class Results:
         counts: method -> task -> count.
         notes: what a reader must know to compare the numbers, one sentence each.
         change: what the scenes differed in from the demonstrated ones; nothing but poses if empty.
+        instances: whether the scenes showed the demonstrated objects or others of their kind.
     """
 
     suite: str
@@ -48,6 +53,7 @@ class Results:
     counts: Mapping[str, Mapping[str, Count]]
     notes: tuple[str, ...] = ()
     change: str = ""
+    instances: Instances = "same"
 
     def average(self, method: str) -> float:
         """Mean of the tasks' success rates."""
@@ -67,7 +73,7 @@ class Results:
             for name, tasks in self.counts.items()
         }
         head = {"suite": self.suite, "split": self.split, "seed": self.seed, "change": self.change}
-        return {**head, "methods": methods}
+        return {**head, "instances": self.instances, "methods": methods}
 
     def rows(self) -> list[list[str]]:
         """Header and one row per task, then the average."""
@@ -80,7 +86,8 @@ class Results:
 
     @property
     def _changed(self) -> str:
-        return f", changed: {self.change}" if self.change else ""
+        other = ", other instances" if self.instances == "other" else ""
+        return other + (f", changed: {self.change}" if self.change else "")
 
     def markdown(self) -> str:
         """The table with its conditions, as Markdown."""

@@ -30,6 +30,7 @@ class Trial:
         variation: of the task.
         instance: seed of shapes, sizes and colours.
         change: names of `tasks.changes.FACTORS`, joined by commas; what the scene differs in.
+        shown: that of the demonstration; None if it is the same.
 
     Raises:
         InvalidInput: for a negative seed, or an unknown change.
@@ -40,21 +41,27 @@ class Trial:
     variation: int = 0
     instance: int = 0
     change: str = ""
+    shown: int | None = None
 
     def __post_init__(self) -> None:
-        for name in ("seed", "instance"):
-            if getattr(self, name) < 0:
+        for name in ("seed", "instance", "shown"):
+            if (getattr(self, name) or 0) < 0:
                 raise InvalidInput(name, f"{getattr(self, name)}", "a whole number from 0 on")
         object.__setattr__(self, "change", ",".join(read_factors(self.change)))
 
     @cached_property
     def changed(self) -> Change:
         """What the scene, and what is seen of it, differs in."""
-        return Change.of(self.change, self.task, self.variation, self.instance, self.seed)
+        return Change.of(self.change, self.task, self.variation, self.shown_instance, self.seed)
 
     def make_task(self) -> Task:
         """The task, its things at their size in the scene."""
         return self.changed.of_size(make_task(self.task))
+
+    @property
+    def shown_instance(self) -> int:
+        """Seed of the objects of the demonstration."""
+        return self.instance if self.shown is None else self.shown
 
     def env(self) -> ImopEnv:
         """The environment, reset to this scene.
@@ -70,7 +77,7 @@ class Trial:
 
 
 def demonstration_for(trial: Trial) -> Demonstration:
-    """One demonstration of the trial's task, variation and instance, in a scene that is never tested.
+    """One demonstration of the trial's task, variation and shown instance, in a scene that is never tested.
 
     The trial's change of the scene does not apply to it, but that of the set-up does.
 
@@ -81,7 +88,7 @@ def demonstration_for(trial: Trial) -> Demonstration:
     task = make_task(trial.task)
     for seed in range(DEMONSTRATION_SEED, DEMONSTRATION_SEED + _RECORDING_ATTEMPTS):
         try:
-            recorded = record_demonstration(task, seed, trial.variation, trial.instance)
+            recorded = record_demonstration(task, seed, trial.variation, trial.shown_instance)
             return _seen(recorded, trial.changed.shown)
         except (ExpertFailed, NoRoom) as error:
             failure: ImopError = error
@@ -102,14 +109,16 @@ def suite_trials(
     seed: int,
     instance: int,
     change: str = "",
+    other: bool = False,
 ) -> dict[str, list[Trial]]:
     """`episodes` scenes for each task, by its name within the suite, with the task's variations in turn.
 
-    Of a change every task gets the factors that it has; tasks that have none of them are left out.
+    If `other`, every scene shows another instance of the things than the demonstration, which shows
+    `instance`. Of a change every task gets the factors that it has; tasks that have none are left out.
 
     Raises:
-        InvalidInput: for an unknown suite, split, task or change, a change that none of the tasks has, no
-            episodes, or seeds of demonstrations.
+        InvalidInput: for an unknown suite, split, task or change, a change that none of the tasks has, other
+            instances where a task has one, no episodes, or seeds of demonstrations.
     """
     if episodes < 1:
         raise InvalidInput("episodes", f"{episodes}", "at least 1")
@@ -117,10 +126,19 @@ def suite_trials(
         problem = f"{episodes} scenes from {seed} on"
         raise InvalidInput("seed", problem, f"scenes below {DEMONSTRATION_SEED}, where demonstrations begin")
     kinds = {name: find_task(name) for name in chosen_tasks(suite, split, tasks)}
+    if single := [name for name, kind in kinds.items() if other and kind.one_instance]:
+        raise InvalidInput("instances", f"other, but {single[0]} has one instance of its things", "same")
     changes = changes_of(kinds, change)
     return {
         name.removeprefix(f"{suite}/"): [
-            Trial(name, seed + i, i % kind.variations, instance, ",".join(changes[name]))
+            Trial(
+                name,
+                seed + i,
+                i % kind.variations,
+                instance + other * (1 + seed + i),
+                ",".join(changes[name]),
+                instance if other else None,
+            )
             for i in range(episodes)
         ]
         for name, kind in kinds.items()

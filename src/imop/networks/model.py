@@ -1,4 +1,4 @@
-"""The three networks together: sizes, and files that hold weights and configuration."""
+"""The networks together: sizes, and files that hold weights and configuration."""
 
 import hashlib
 import json
@@ -20,11 +20,12 @@ from imop.networks.matching import MatchingConfig, MatchingNetwork
 from imop.networks.pose import PoseConfig, pose_network
 from imop.networks.region import GRIPPER_FEATURES, RegionConfig, RegionNetwork
 from imop.networks.routing import INPUTS, RoutingConfig, RoutingNetwork
+from imop.networks.verification import VerificationConfig, VerificationNetwork
 
 VERSION = 1
 CARD = "card.json"
 WEIGHTS = "weights.safetensors"
-NETWORKS = ("region", "matching", "routing", "pose")
+NETWORKS = ("region", "matching", "routing", "verification", "pose")
 
 
 ROUTE_GRAPH = GraphConfig(voxel=0.02, plane_voxel=0.08, max_points=256, grids=(), neighbours=1)
@@ -41,6 +42,7 @@ class ModelConfig:
     region: RegionConfig = field(default_factory=RegionConfig)
     matching: MatchingConfig = field(default_factory=MatchingConfig)
     routing: RoutingConfig = field(default_factory=RoutingConfig)
+    verification: VerificationConfig = field(default_factory=VerificationConfig)
     pose: PoseConfig = field(default_factory=PoseConfig)
     route_graph: GraphConfig = ROUTE_GRAPH
 
@@ -72,7 +74,7 @@ PAPER = ModelConfig(
 
 
 class Model(nn.Module):
-    """Region, matching and routing networks, and one for the pose if the configuration wants it."""
+    """Region, matching, routing, verification, and one for the pose if the configuration wants it."""
 
     def __init__(self, config: ModelConfig):
         super().__init__()
@@ -80,6 +82,7 @@ class Model(nn.Module):
         self.region = RegionNetwork(config.region)
         self.matching = MatchingNetwork(config.matching)
         self.routing = RoutingNetwork(config.routing)
+        self.verification = VerificationNetwork(config.verification)
         self.pose = pose_network(config.pose)
 
     def parameter_table(self) -> dict[str, int]:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from imop.geometry import se3
+from imop.geometry.clusters import Objects, connected
 from imop.geometry.neighbours import nearest, within
 from imop.policy.matcher import Transition
-from imop.policy.objects import Objects, connected
 from imop.types import BoolArray, FloatArray
 
 # Two observations of one surface are this near to each other, metres.

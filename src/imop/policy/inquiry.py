@@ -5,10 +5,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from imop.geometry import se3
+from imop.geometry.icp import CLOSE, FINEST, NEARBY, upright
+from imop.geometry.ransac import distinct
 from imop.policy.evidence import Judge
-from imop.policy.hypotheses import distinct
 from imop.policy.matcher import Hypothesis
-from imop.policy.refine import CLOSE, FINEST, NEARBY, upright
 from imop.policy.search import Search, upright_motions
 from imop.policy.things import Things, middle
 from imop.types import BoolArray, FloatArray

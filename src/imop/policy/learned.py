@@ -14,6 +14,7 @@ import numpy as np
 import torch
 
 from imop.geometry.cloud import PointCloud
+from imop.geometry.icp import SMALLEST
 from imop.geometry.neighbours import nearest, within
 from imop.networks.graph import Graph, build_graph
 from imop.networks.model import Model
@@ -23,7 +24,6 @@ from imop.policy.inquiry import Inquiry
 from imop.policy.learned_region import FEWEST, ShownRegion, find_shown_regions
 from imop.policy.matcher import Hypothesis, Scene, Transition
 from imop.policy.matches import Matches
-from imop.policy.refine import SMALLEST
 from imop.policy.region import ENOUGH, Region
 from imop.policy.search import Search
 from imop.policy.sought import Sought, SoughtConfig, nodes_at

@@ -1,20 +1,20 @@
 """The invariant region of a demonstrated step as the region network finds it, on the full cloud."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from imop.geometry import se3
+from imop.geometry.clusters import connected, find_objects
 from imop.geometry.neighbours import nearest, within
 from imop.networks.graph import Graph, build_graph
 from imop.networks.model import Model
 from imop.networks.region import StepBatch, one_step
 from imop.policy.contacts import SAME, Contacts, find_contacts, is_open
 from imop.policy.matcher import Transition
-from imop.policy.objects import connected, find_objects
 from imop.policy.region import ENOUGH, Region, find_region
 from imop.types import FloatArray
 
@@ -41,6 +41,7 @@ class ShownRegion:
     Attributes:
         steps: a batch of the step alone, as the networks see it.
         probability: (N,) of the points of the support state to be in the region, by the network.
+        trust: (N,) of them in a fit to another thing; see `RegionPrediction.trust`.
         inside: (R,) those that are, in order of their index.
         region: the same on the full cloud.
         completed: (M, 3) points of the region with the things that are mostly in it whole, metres.
@@ -50,6 +51,7 @@ class ShownRegion:
 
     steps: StepBatch
     probability: Tensor
+    trust: Tensor
     inside: Tensor
     region: Region
     completed: FloatArray
@@ -91,7 +93,8 @@ def _find(
     before, after = (build_graph(s.cloud, config, s.ground) for s in (step.before, step.after))
     batch = _batch(step, before, after, config.neighbours)
     with torch.inference_mode():
-        probability = model.region(batch).probability
+        predicted = model.region(batch)
+    probability = predicted.probability
     nodes = before.points.double().numpy()
     inside = _likely(probability, threshold)
     standing = ~step.before.ground.bare[nearest(nodes, step.before.cloud.points)[1][:, 0]]
@@ -108,7 +111,10 @@ def _find(
         region = _dense(step, nodes, probability.double().numpy(), inside, p_held)
     taken = _taken(step, region, contacts.taken(k, steps))
     points = _completed(step, nodes, probability, region, threshold)
-    return ShownRegion(batch, probability, inside, region, points, taken, bool(contacts.holding[k]))
+    owner = nearest(region.cloud.points, nodes)[1][:, 0]
+    region = replace(region, spread=predicted.spread.double().numpy()[owner])
+    holding = bool(contacts.holding[k])
+    return ShownRegion(batch, probability, predicted.trust, inside, region, points, taken, holding)
 
 
 def _away(step: Transition, p_gripper_held: FloatArray, points: FloatArray) -> float:

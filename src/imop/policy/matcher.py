@@ -10,9 +10,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from imop.geometry.cloud import PointCloud
 from imop.geometry.perception import Ground, find_ground, open_ground, open_plane, with_normals
 from imop.types import Action, BoolArray, FloatArray, Observation
@@ -65,24 +62,6 @@ class Transition:
 
 
 @dataclass(frozen=True, eq=False)
-class Correspondences:
-    """Weighted pairs of points, the sparse form of the paper's matrix C.
-
-    Attributes:
-        i_support: (K,) indices into the region's points.
-        i_query: (K,) indices into the query's points.
-        weight: (K,) not negative.
-    """
-
-    i_support: NDArray[np.int64]
-    i_query: NDArray[np.int64]
-    weight: FloatArray
-
-    def __len__(self) -> int:
-        return len(self.weight)
-
-
-@dataclass(frozen=True, eq=False)
 class Hypothesis:
     """One way in which the region may have moved from the demonstrated scene into the observed one.
 
@@ -91,12 +70,16 @@ class Hypothesis:
         score: 0 .. 1, the share of the region that the observed points explain.
         p_support: (K, 3) points of the region that found a counterpart.
         p_query: (K, 3) the counterparts.
+        generator: who proposed it, if that is known; see `candidates/proposals.py`.
+        probability: 0 .. 1, of being right, if something was trained to tell it.
     """
 
     T_query_support: FloatArray
     score: float
     p_support: FloatArray
     p_query: FloatArray
+    generator: str = ""
+    probability: float | None = None
 
 
 class PreparedStep(Protocol):

@@ -7,9 +7,9 @@ import torch
 from torch import Tensor
 
 from imop.geometry.neighbours import nearest, within
+from imop.geometry.ransac import agreement, sample_motions
 from imop.networks.graph import Graph
 from imop.policy.contacts import SAME
-from imop.policy.hypotheses import agreement, sample_motions
 from imop.policy.search import upright_motions
 from imop.policy.things import Things, middle
 from imop.types import FloatArray

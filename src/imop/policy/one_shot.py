@@ -11,9 +11,8 @@ from imop.geometry.view_alignment import corrected, find_errors
 from imop.networks.model import BUNDLED, load_model
 from imop.policy.hypotheses import confidence
 from imop.policy.learned import LearnedMatcher
-from imop.policy.learned_router import LearnedRouter
 from imop.policy.matcher import Hypothesis, Matcher, PreparedStep, Scene, Transition
-from imop.policy.router import AdvancingRouter, Router
+from imop.policy.router import AdvancingRouter, LearnedRouter, Router
 from imop.types import Action, Demonstration, FloatArray, Match, Observation
 
 Feasible = Callable[[FloatArray], bool]

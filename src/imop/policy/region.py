@@ -14,10 +14,10 @@ import numpy as np
 
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, concatenate
+from imop.geometry.clusters import Objects, find_objects
 from imop.geometry.neighbours import nearest, within
 from imop.policy.contacts import SAME, Contacts, find_contacts, leaving
 from imop.policy.matcher import Transition
-from imop.policy.objects import Objects, find_objects
 from imop.types import BoolArray, FloatArray
 
 # Weight of a point of the region falls with its distance from the contact; scale in metres.
@@ -25,6 +25,8 @@ FADING = 0.15
 LEAST_WEIGHT = 0.2
 # Lowest point of something that stands on the plane, metres; what is higher is fixed to something else.
 STANDING = 0.04
+# What is taken for the spread of points of which nothing is known, metres.
+UNKNOWN = 0.01
 # A cluster of fewer points (of a 5 mm grid) fits anywhere.
 ENOUGH = 30
 # What hangs in the air or is too small is taken with what lies this near to it, metres.
@@ -42,6 +44,8 @@ class Region:
             region; they have to be left out of the query as well.
         context: what the region is connected to. It may have moved on its own, so it only tells apart what
             the region alone does not: the two ends of a box without its latch.
+        spread: (M,) metres, how far the counterpart of each point is expected from it on another thing of
+            the same kind, both seen from the action; None if nothing is known.
         firm: whether its points are meant to move as one, so that one seen to be absent speaks against
             a motion. A cluster may have joints and neighbours.
     """
@@ -51,11 +55,17 @@ class Region:
     p_gripper_held: FloatArray
     context: PointCloud | None = None
     firm: bool = False
+    spread: FloatArray | None = None
 
     @cached_property
     def whole(self) -> PointCloud:
         """The region, then its context."""
         return self.cloud if self.context is None else concatenate([self.cloud, self.context])
+
+    @cached_property
+    def spreads(self) -> FloatArray:
+        """(M,) the spread, or a usual one if nothing is known of it."""
+        return np.full(len(self.cloud), UNKNOWN) if self.spread is None else self.spread
 
     def colorless(self) -> "Region":
         """The same region without its colours."""

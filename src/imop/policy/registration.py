@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from imop.geometry.cloud import PointCloud, farthest_points, voxel_downsample
+from imop.geometry.clusters import find_objects
 from imop.geometry.features import fpfh
-from imop.policy.hypotheses import mutual_matches, sample_motions
+from imop.geometry.ransac import mutual_matches, sample_motions
 from imop.policy.inquiry import Inquiry
 from imop.policy.matcher import Hypothesis, Scene, Transition
-from imop.policy.objects import find_objects
 from imop.policy.region import Region, find_regions
 from imop.policy.search import Search, SearchConfig, upright_motions
 from imop.policy.things import Things, middle, without_held

@@ -7,10 +7,10 @@ import numpy as np
 
 from imop.geometry import se3
 from imop.geometry.cloud import farthest_points, inside_box
+from imop.geometry.clusters import connected
 from imop.geometry.neighbours import nearest
 from imop.policy.evidence import Template
 from imop.policy.matcher import Scene
-from imop.policy.objects import connected
 from imop.policy.region import Region
 from imop.policy.symmetry import half_turn
 from imop.types import BoolArray, FloatArray

@@ -9,9 +9,9 @@ import numpy as np
 
 from imop.geometry import se3
 from imop.geometry.cloud import farthest_points
+from imop.geometry.icp import Refiner, upright
 from imop.geometry.neighbours import nearest
 from imop.policy.evidence import Surface
-from imop.policy.refine import Refiner, upright
 from imop.types import FloatArray
 
 TURNS = np.radians(np.arange(45.0, 360.0, 45.0))

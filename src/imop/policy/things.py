@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, facing
+from imop.geometry.clusters import connected
+from imop.geometry.icp import SMALLEST, Refiner
 from imop.geometry.neighbours import nearest, within
 from imop.geometry.perception import viewpoints
 from imop.policy.contacts import SAME
 from imop.policy.evidence import Surface, shades
 from imop.policy.matcher import Scene
-from imop.policy.objects import connected
-from imop.policy.refine import SMALLEST, Refiner
 from imop.policy.region import Region
 from imop.types import BoolArray, FloatArray
 

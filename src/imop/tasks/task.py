@@ -24,6 +24,7 @@ class Task(ABC):
         step_limit: how many actions an episode may take.
         insist: whether a motion that would touch something is made all the same if there is no other.
         graspable: bodies that the gripper may attach.
+        one_instance: whether its things are the same in every instance.
         told_by_color: whether the things acted on are told from others by their colours, which then must
             stay as they were demonstrated.
         sizes: smallest and largest scale of its things, see `resized`; None if they have one size only.
@@ -34,6 +35,7 @@ class Task(ABC):
     step_limit: int = 25
     insist: bool = False
     graspable: tuple[str, ...] = ()
+    one_instance: ClassVar[bool] = False
     told_by_color: ClassVar[bool] = False
     sizes: ClassVar[tuple[float, float] | None] = None
 

@@ -10,12 +10,11 @@ from imop.geometry.neighbours import nearest
 from imop.training.families.thing import Family
 from imop.training.instances import Variation, other_instances
 from imop.training.invariance import distances, has_invariant_part
-from imop.training.pairs import StepPair
 from imop.training.plans import draw_plan
 from imop.training.scenes import Scene, build, demonstrate
 from imop.training.stage import Unreachable
 from imop.training.surfaces import surface
-from imop.training.takes import Poses, Take, reference, rigid_with, seen_pair, take
+from imop.training.takes import Example, Poses, Take, reference, rigid_with, seen_pair, take
 from imop.training.viewpoints import placed_cameras
 from imop.types import FloatArray
 
@@ -58,7 +57,7 @@ def pairs_across(
     variation: Variation,
     rng: np.random.Generator,
     kinds: Sequence[str] = (),
-) -> list[StepPair]:
+) -> list[Example]:
     """The pairs of one scene, whose things are others in the query; of some kinds of what is done, or all.
 
     Raises:
@@ -92,7 +91,7 @@ def _instance(scene: Scene, rng: np.random.Generator) -> _Instance:
     return _Instance(scene, take(scene, rng), again)
 
 
-def _pair(shown: _Instance, asked: _Instance, step: int, labelled: bool) -> StepPair | None:
+def _pair(shown: _Instance, asked: _Instance, step: int, labelled: bool) -> Example | None:
     """The pair of a step; None if too little of it is seen, or nothing stays near the action."""
     fixed_to = reference(asked.scene, step)
     both = asked.rigid(step)
@@ -103,10 +102,10 @@ def _pair(shown: _Instance, asked: _Instance, step: int, labelled: bool) -> Step
     M = T_world_link @ se3.invert(now[fixed_to])
     before = {link: M @ now[link] for link in members}
     pair = seen_pair((shown.scene, shown.take), (asked.scene, asked.take), step, members, before)
-    if pair is None or not labelled:
-        return pair
-    label = _label(shown, asked, step, members)
-    return replace(pair, invariance=label) if has_invariant_part(label) else None
+    if pair is not None and labelled:
+        label = _label(shown, asked, step, members)
+        pair = replace(pair, invariance=label) if has_invariant_part(label) else None
+    return None if pair is None else Example(pair, shown.take, asked.take, step)
 
 
 def _label(shown: _Instance, asked: _Instance, step: int, members: list[tuple[int, str]]) -> FloatArray:

@@ -182,7 +182,10 @@ class Stage:
         size: int = 128,
     ) -> PointCloud:
         """The cloud of a state as training stores it, with instance ids, from images of `size` x `size`."""
-        observation = self.observe(state, noise, rng, size)
+        return self.stored(self.observe(state, noise, rng, size), stored)
+
+    def stored(self, observation: Observation, stored: GraphConfig = STORED) -> PointCloud:
+        """The cloud of an observation as training stores it, with instance ids."""
         return thin(self._perception(observation), stored)[0]
 
 

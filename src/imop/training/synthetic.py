@@ -12,7 +12,7 @@ from imop.training.instances import VARIATIONS, Variation, shares
 from imop.training.pairs import StepPair
 from imop.training.scenes import draw_scene
 from imop.training.stage import Unreachable
-from imop.training.takes import make_pair, take
+from imop.training.takes import Example, make_pair, take
 
 TAKES = 2
 """How often a scene's recipe is demonstrated; every two takes make pairs. New scenes teach more than new
@@ -44,7 +44,12 @@ def synthetic_pairs(
         InvalidInput: if the mix is not four shares, or the families cannot give a pair of it.
     """
     wanted = shares(mix)
-    streams = {variation: _pairs(families, variation, seed, kinds) for variation in wanted}
+    streams = {
+        variation: (
+            example.pair for scene in synthetic_scenes(families, variation, seed, kinds) for example in scene
+        )
+        for variation in wanted
+    }
     made = dict.fromkeys(wanted, 0)
     for number in range(1, count + 1):
         due = max(wanted, key=lambda variation: wanted[variation] * number - made[variation])
@@ -52,10 +57,14 @@ def synthetic_pairs(
         yield next(streams[due])
 
 
-def _pairs(
-    families: Mapping[str, Family], variation: Variation, seed: int, kinds: Sequence[str]
-) -> Iterator[StepPair]:
-    """Pairs of one variation without end."""
+def synthetic_scenes(
+    families: Mapping[str, Family], variation: Variation, seed: int, kinds: Sequence[str] = ()
+) -> Iterator[list[Example]]:
+    """The pairs of scene after scene of one variation, without end; of some kinds of what is done, or all.
+
+    Raises:
+        InvalidInput: if the families cannot give a pair of it.
+    """
     number = VARIATIONS.index(variation)
     rng = np.random.default_rng((seed, number) if number else seed)
     fruitless = 0
@@ -67,12 +76,13 @@ def _pairs(
                 made = pairs_across(families, variation, rng, kinds)
         except Unreachable:
             made = []
-        yield from made
+        if made:
+            yield made
         fruitless = 0 if made else fruitless + 1
     raise InvalidInput("mix", f"no pair of {variation} in {_PATIENCE} scenes", "more families, or less of it")
 
 
-def _same(families: Mapping[str, Family], rng: np.random.Generator, kinds: Sequence[str]) -> list[StepPair]:
+def _same(families: Mapping[str, Family], rng: np.random.Generator, kinds: Sequence[str]) -> list[Example]:
     scene = draw_scene(families, rng, kinds=kinds)
     takes = [take(scene, rng) for _ in range(TAKES)]
     found = [

@@ -12,7 +12,7 @@ from imop.training.families.thing import Thing, revolution
 from imop.training.pairs import StepPair
 from imop.training.scenes import Scene, demonstrate
 from imop.training.stage import State
-from imop.types import FloatArray
+from imop.types import FloatArray, Observation
 
 _SAME_PLACE, _SAME_TURN = 0.002, np.radians(1.0)
 _FEWEST_REGION, _FEWEST_QUERY = 12, 10
@@ -26,13 +26,32 @@ class Take:
 
     Attributes:
         states: before the first step, and after each.
-        clouds: what was seen in each state, with instance ids.
+        observations: what was seen in each state.
+        clouds: the same as training stores it, with instance ids.
         poses: the links in each state.
     """
 
     states: tuple[State, ...]
+    observations: tuple[Observation, ...]
     clouds: tuple[PointCloud, ...]
     poses: tuple[Poses, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Example:
+    """A pair, and the takes that it comes from.
+
+    Attributes:
+        pair: of a step.
+        shown: the demonstration.
+        asked: the execution that the query is of.
+        step: its number.
+    """
+
+    pair: StepPair
+    shown: Take
+    asked: Take
+    step: int
 
 
 def take(scene: Scene, rng: np.random.Generator) -> Take:
@@ -43,17 +62,19 @@ def take(scene: Scene, rng: np.random.Generator) -> Take:
     """
     states = demonstrate(scene, rng)
     noise = DepthNoise.sample(rng)
-    clouds = tuple(scene.stage.cloud(state, noise, rng) for state in states)
-    return Take(tuple(states), clouds, tuple(scene.stage.link_poses(state) for state in states))
+    observations = tuple(scene.stage.observe(state, noise, rng) for state in states)
+    clouds = tuple(scene.stage.stored(observation) for observation in observations)
+    return Take(tuple(states), observations, clouds, tuple(scene.stage.link_poses(state) for state in states))
 
 
-def make_pair(scene: Scene, support: Take, query: Take, step: int) -> StepPair | None:
+def make_pair(scene: Scene, support: Take, query: Take, step: int) -> Example | None:
     """The pair of a step in two takes; None if it is loose or too little of what matters is seen."""
     if scene.recipe.steps[step].loose:
         return None
     before, now = support.poses[step], query.poses[step]
     members = rigid_with(reference(scene, step), before, now)
-    return seen_pair((scene, support), (scene, query), step, members, before)
+    pair = seen_pair((scene, support), (scene, query), step, members, before)
+    return None if pair is None else Example(pair, support, query, step)
 
 
 def seen_pair(

@@ -24,7 +24,7 @@ def world():
 
 
 def middles(world):
-    names = ["rope/body", *(f"rope/link{i}" for i in range(1, SHAPE.links))]
+    names = ["rope/body", *(f"rope/link{i}" for i in range(1, SHAPE.links - 1)), "rope/end"]
     return np.stack([world.pose(name)[:3, 3] for name in names])
 
 

@@ -30,11 +30,11 @@ class RopeShape:
     @property
     def ends(self) -> tuple[str, str]:
         """Names of the bodies at both ends."""
-        return "body", f"link{self.links - 1}"
+        return "body", "end"
 
 
 def rope(shape: RopeShape, color: Color, end_colors: tuple[Color, Color]) -> Any:
-    """A rope that moves freely, straight along +x; its links are "body", "link1", "link2", ...
+    """A rope that moves freely, straight along +x; its links are "body", "link1", ... and "end".
 
     Frame of a link: its middle, +x to the next link.
     """
@@ -42,7 +42,9 @@ def rope(shape: RopeShape, color: Color, end_colors: tuple[Color, Color]) -> Any
     half = shape.pitch / 2
     for i in range(shape.links):
         if i > 0:
-            body = body.add_body(name=f"link{i}", pos=[shape.pitch, 0, 0])
+            # The end has one name whatever the number of links: what is done with it is the same.
+            name = "end" if i == shape.links - 1 else f"link{i}"
+            body = body.add_body(name=name, pos=[shape.pitch, 0, 0])
             body.add_joint(
                 name=f"link{i}",
                 type=mujoco.mjtJoint.mjJNT_BALL,

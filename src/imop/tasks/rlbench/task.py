@@ -95,6 +95,7 @@ class RLBenchTask(Task):
     """
 
     insist = True
+    one_instance = True
     # Tasks whose files would be too large for the workspace say less, see `_place`.
     sizes: ClassVar[tuple[float, float] | None] = (0.85, 1.15)
     scale: float = 1.0

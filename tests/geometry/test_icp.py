@@ -5,7 +5,7 @@ import pytest
 
 from imop.errors import InvalidInput
 from imop.geometry import se3
-from imop.policy.refine import Refiner, upright
+from imop.geometry.icp import Refiner, upright
 from tests.policy.scenes import RED, at, box
 
 

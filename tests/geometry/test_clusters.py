@@ -3,8 +3,8 @@
 import numpy as np
 
 from imop.geometry.cloud import concatenate
+from imop.geometry.clusters import connected, find_objects
 from imop.geometry.perception import supporting_plane
-from imop.policy.objects import connected, find_objects
 from tests.policy.scenes import RED, TABLE, at, box, table
 
 

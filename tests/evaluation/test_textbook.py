@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from imop.errors import MissingExtra
+from imop.evaluation import textbook
 from imop.geometry import se3
-from imop.policy import textbook
 from tests.policy.scenes import RED, TABLE, above, at, box, scene, transitions
 
 HOME = above(0.0, -0.3, 1.2)

@@ -3,7 +3,7 @@
 import pytest
 
 from imop.errors import InvalidInput
-from imop.policy.baselines import ReplayPolicy
+from imop.evaluation.replay import ReplayPolicy
 
 
 def test_replay_repeats_the_demonstration_and_then_its_last_action(shown, wanted):

@@ -1,0 +1,259 @@
+"""What speaks for a motion of a region: how it explains what the cameras saw, point by point, in numbers.
+
+Forward, the observed points have to explain the moved region; backward, the region has to explain what was
+observed around it, which tells a thing from a larger one and a front with handles from a back. Nothing is
+decided here: `networks/verification.py` learns what the numbers are worth.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from imop.geometry import se3
+from imop.geometry.cloud import PointCloud, concatenate, farthest_points, project
+from imop.policy.region import Region
+from imop.types import BoolArray, CameraView, Float32Array, FloatArray
+
+# Farthest counterpart, metres.
+REACH = 0.03
+# Standard deviations of what is explained exactly: off the counterpart's tangent plane and along it, metres.
+OFFSET, ALONG = 0.005, 0.008
+# Standard deviation of the difference of two shades of one colour; see `shades`.
+SHADE = 0.25
+# What a counterpart counts that faces the other way: thin walls are seen from either side.
+BEHIND = 0.9
+# A camera sees a face from this cosine of the angle to its normal on, and must see this far (metres) behind
+# a point to prove it absent.
+GRAZING, THROUGH = 0.25, 0.02
+# Observed points this near to the moved region, metres, have to be explained by it.
+AROUND = 0.04
+# What is next to the gripper: scale of the weights, metres.
+NEXT = 0.05
+# What is around the gripper, metres.
+BESIDE = 0.08
+# Points that are compared: of the region, of its context, and of what was observed around it.
+POINTS, CONTEXT, BACKWARD = 400, 150, 200
+# The same at a glance.
+GLANCE, GLANCE_CONTEXT = 100, 40
+
+
+def shades(colors: Float32Array) -> FloatArray:
+    """Colours (N, 3) of 0 .. 1 as (N, 4) hue and a little brightness, for light changes with a turn."""
+    bright = colors.mean(axis=1, keepdims=True).astype(np.float64)
+    return np.concatenate([(colors - bright) / (bright + 0.05), 0.35 * bright], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """How well a surface explains K points.
+
+    Attributes:
+        exact: (K,) 0 .. 1, as if the thing were the same.
+        loose: (K,) 0 .. 1, with the spread that each point is allowed.
+        color: (K,) 0 .. 1, agreement of the colours; 0 where there is no counterpart.
+        index: (K,) the counterparts.
+    """
+
+    exact: FloatArray
+    loose: FloatArray
+    color: FloatArray
+    index: NDArray[np.int64]
+
+
+class Surface:
+    """What was observed of a scene or of a part of it.
+
+    Args:
+        cloud: at least one point, with normals.
+        views: that it was seen in.
+    """
+
+    def __init__(self, cloud: PointCloud, views: Sequence[CameraView]) -> None:
+        self.cloud, self._views = cloud, views
+        self.tree = cKDTree(cloud.points)
+        self._shades = shades(cloud.colors)
+        # The grid has spread the points evenly already.
+        self.sample = np.arange(0, len(cloud), max(1, len(cloud) // 1000))
+
+    def explain(
+        self, points: FloatArray, normals: FloatArray, hue: FloatArray, spread: FloatArray
+    ) -> Explained:
+        """How well this explains points (K, 3) with normals (K, 3), shades (K, 4) and a spread (K,)."""
+        assert self.cloud.normals is not None
+        distance, index = self.tree.query(points, distance_upper_bound=REACH)
+        found = np.isfinite(distance)
+        index = np.where(found, index, 0).astype(np.int64)
+        n = self.cloud.normals[index]
+        offset = np.einsum("mk,mk->m", n, points - self.cloud.points[index]) ** 2
+        along = np.maximum(np.where(found, distance, 0.0) ** 2 - offset, 0.0)
+        facing = np.einsum("mk,mk->m", n, normals)
+        facing = np.where(found, np.clip(np.where(facing < 0, -BEHIND * facing, facing), 0.0, 1.0), 0.0)
+        exact = facing * np.exp(-0.5 * (offset / OFFSET**2 + along / ALONG**2))
+        more = spread**2
+        loose = facing * np.exp(-0.5 * (offset / (OFFSET**2 + more) + along / (ALONG**2 + more)))
+        color = np.exp(-0.5 * (((hue - self._shades[index]) / SHADE) ** 2).sum(axis=1))
+        return Explained(exact, loose, np.where(found, color, 0.0), index)
+
+    def seen(self, points: FloatArray, normals: FloatArray) -> tuple[BoolArray, BoolArray]:
+        """(K,) True where no view can say that a face at the point, with its normal, is not there.
+
+        A view can if the face lies in its image and turns to it, and nothing nearer stands before it. And
+        (K,) True where a view sees through the point to what is farther away.
+        """
+        hidden, through = np.ones(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
+        for view in self._views:
+            to_camera = view.T_world_camera[:3, 3] - points
+            distance = np.maximum(np.linalg.norm(to_camera, axis=1), 1e-9)
+            slant = np.einsum("mk,mk->m", to_camera, normals) / distance
+            (column, row), z, inside = (part.T for part in project(view, points))
+            depth = view.depth[row, column]
+            beyond = np.where(inside & np.isfinite(depth) & (depth > 0), depth - z, -np.inf)
+            hidden &= ~((beyond > -THROUGH) & (slant > GRAZING))
+            through |= beyond > THROUGH
+        return hidden, through
+
+
+class Template:
+    """A region ready to be compared with any scene.
+
+    Args:
+        region: of a step.
+        p_goal: (3,) where the action takes the tip.
+        beside: what stands around there in the demonstrated scene, with normals; at least one point.
+        views: of the demonstrated scene.
+    """
+
+    def __init__(
+        self, region: Region, p_goal: FloatArray, beside: PointCloud, views: Sequence[CameraView]
+    ) -> None:
+        chosen = farthest_points(region.cloud.points, POINTS)
+        context = region.context
+        few = farthest_points(context.points, CONTEXT) if context is not None else np.zeros(0, dtype=np.int64)
+        parts = [region.cloud.select(chosen)]
+        if context is not None:
+            parts.append(context.select(few))
+        self.cloud = concatenate(parts)
+        self.hue = shades(self.cloud.colors)
+        self.spread = np.concatenate([region.spreads[chosen], np.full(len(few), OFFSET)])
+        self.weights = self._weights(region, chosen, len(few), p_goal)
+        self.size = len(chosen)
+        glance = np.arange(len(self.cloud))
+        self.glance = glance[
+            (glance < GLANCE) | (glance >= self.size) & (glance < self.size + GLANCE_CONTEXT)
+        ]
+        self.whole, self.beside = Surface(region.whole, views), Surface(beside, views)
+        self.region, self.p_goal = region, p_goal
+
+    @staticmethod
+    def _weights(region: Region, chosen: NDArray[np.int64], context: int, p_goal: FloatArray) -> FloatArray:
+        """(M, 4) of the region, near the gripper, of what stays in place, and of the context."""
+        weight, spread = region.weight[chosen], region.spreads[chosen]
+        away = np.linalg.norm(region.cloud.points[chosen] - p_goal, axis=1)
+        near = weight * np.exp(-0.5 * ((away - away.min()) / NEXT) ** 2)
+        firm = weight / (1 + (spread / OFFSET) ** 2)
+        own = np.stack([weight, near, firm, np.zeros(len(chosen))], axis=1)
+        others = np.tile([0.0, 0.0, 0.0, 1.0], (context, 1))
+        return np.concatenate([own, others])
+
+    def moved(self, T: FloatArray, which: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+        """Points (H * M, 3) and normals after each of motions (H, 4, 4), one after the other."""
+        assert self.cloud.normals is not None
+        points = se3.apply(T, self.cloud.points[which]).reshape(-1, 3)
+        return points, se3.rotate(T, self.cloud.normals[which]).reshape(-1, 3)
+
+
+def glance(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
+    """(H, 4) quick looks at motions (H, 4, 4): the region in its colours, its shape, the near, the firm."""
+    which = template.glance
+    seen = surface.explain(*template.moved(T, which), *_tiled(template, which, len(T)))
+    loose, color = seen.loose.reshape(len(T), -1), seen.color.reshape(len(T), -1)
+    w = template.weights[which]
+    values = (loose * color, loose, loose * np.sqrt(color), loose)
+    columns = (w[:, 0], w[:, 0], w[:, 1], w[:, 2])
+    return np.stack(
+        [(v * c).sum(1) / max(c.sum(), 1e-9) for v, c in zip(values, columns, strict=True)], axis=1
+    )
+
+
+def shares(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
+    """(H, 23) what `networks.verification.EVIDENCE` names first: forward, context, backward, around."""
+    H, which = len(T), np.arange(len(template.cloud))
+    points, normals = template.moved(T, which)
+    found = surface.explain(points, normals, *_tiled(template, which, H))
+    exact, loose, color = (v.reshape(H, -1) for v in (found.exact, found.loose, found.color))
+    hidden, absent = _missing(surface, points, normals, found.loose)
+    hidden, absent = hidden.reshape(H, -1), absent.reshape(H, -1)
+    columns = []
+    for w in template.weights[:, :3].T:
+        visible = np.maximum((1 - hidden * (1 - loose)) @ w, 1e-9)
+        columns += [exact @ w / visible, loose @ w / visible, *_rest(loose, color, hidden, absent, w)]
+    w = template.weights[:, 3]
+    all_of_it = max(w.sum(), 1e-9)
+    columns += [loose @ w / all_of_it, (loose * color) @ w / np.maximum(loose @ w, 1e-9)]
+    columns += [(absent * (1 - loose)) @ w / all_of_it]
+    rows = np.stack([np.asarray(c) for c in columns], axis=1)
+    backward = np.stack([_backward(template, surface, M) for M in T])
+    return np.concatenate([rows, backward], axis=1)
+
+
+def _rest(
+    loose: FloatArray, color: FloatArray, hidden: FloatArray, absent: FloatArray, w: FloatArray
+) -> list[FloatArray]:
+    got, total = loose @ w, max(float(w.sum()), 1e-9)
+    return [
+        (loose * color) @ w / np.maximum(got, 1e-9),
+        (hidden * (1 - loose)) @ w / total,
+        (absent * (1 - loose)) @ w / total,
+    ]
+
+
+def _missing(
+    surface: Surface, points: FloatArray, normals: FloatArray, loose: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(K,) 1 where a point that is not explained is hidden, and where it is seen through."""
+    doubtful = np.flatnonzero(loose < 0.5)
+    hidden, absent = np.zeros(len(points)), np.zeros(len(points))
+    h, a = surface.seen(points[doubtful], normals[doubtful])
+    hidden[doubtful], absent[doubtful] = h, a & ~h
+    return hidden, absent
+
+
+def _tiled(template: Template, which: NDArray[np.int64], copies: int) -> tuple[FloatArray, FloatArray]:
+    return np.tile(template.hue[which], (copies, 1)), np.tile(template.spread[which], copies)
+
+
+def _backward(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
+    """(5,) what the region explains of what is around it, and what is alike around the gripper."""
+    whole, back = template.whole, se3.invert(T)
+    points = se3.apply(back, surface.cloud.points[surface.sample])
+    near = np.flatnonzero(np.isfinite(whole.tree.query(points, distance_upper_bound=AROUND)[0]))
+    found = _explain(whole, surface.cloud.select(surface.sample[_some(near)]), back)
+    got, all_of_it = float(found.loose.sum()), max(len(found.loose), 1)
+    color = float(found.loose @ found.color) / max(got, 1e-9)
+    forward = _explain(surface, template.beside.cloud, T).loose
+    at = se3.apply(T, template.p_goal[None])[0]
+    inside = np.asarray(surface.tree.query_ball_point(at, BESIDE, return_sorted=True), dtype=np.int64)
+    there = _explain(template.beside, surface.cloud.select(_some(inside)), back).loose
+    return np.array([got / all_of_it, color, np.log1p(len(near)) / 5, forward.mean(), _mean(there)])
+
+
+def _some(index: NDArray[np.int64]) -> NDArray[np.int64]:
+    """About `BACKWARD` of them, spread over the grid in which they are sorted."""
+    return index[:: max(1, len(index) // BACKWARD)]
+
+
+def _mean(values: FloatArray) -> float:
+    """1 if there is nothing."""
+    return float(values.mean()) if len(values) else 1.0
+
+
+def _explain(surface: Surface, cloud: PointCloud, T: FloatArray) -> Explained:
+    """How well a surface explains a cloud with normals, moved by `T`, but for what cameras leave open."""
+    assert cloud.normals is not None
+    spread = np.full(len(cloud), OFFSET)
+    return surface.explain(
+        se3.apply(T, cloud.points), se3.rotate(T, cloud.normals), shades(cloud.colors), spread
+    )

@@ -1,0 +1,192 @@
+"""One search in one scene: cheap generators first, until a candidate is likely enough."""
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from imop.candidates.evidence import BESIDE, Template
+from imop.candidates.pool import Asked, Part, PolicyConfig, Pool, Sought, Target
+from imop.candidates.proposals import (
+    SAME,
+    equal_turns,
+    half_turn,
+    middle,
+    straightened,
+    thing_of,
+    upright_motions,
+)
+from imop.candidates.verification import Verifier
+from imop.geometry import se3
+from imop.geometry.cloud import PointCloud, farthest_points, inside_box
+from imop.geometry.icp import SMALLEST, upright
+from imop.geometry.neighbours import within
+from imop.policy.matcher import Hypothesis, Scene, Transition
+from imop.policy.region import Region
+from imop.types import BoolArray, FloatArray
+
+
+class StepSearch:
+    """A demonstrated step, searched in any number of scenes.
+
+    Args:
+        config: how thoroughly.
+        step: the demonstrated one.
+        region: of it.
+        payload: what the hand takes next, if it is less than the region.
+        verifier: gives probabilities.
+        ask: the matcher's opinion of a scene; it is asked only if what was done before does not suffice.
+    """
+
+    def __init__(
+        self,
+        config: PolicyConfig,
+        step: Transition,
+        region: Region,
+        payload: PointCloud | None,
+        verifier: Verifier,
+        ask: Callable[[Scene], Asked],
+    ) -> None:
+        before, T_goal = step.before, step.action.T_world_gripper
+        views = tuple(before.observation.views.values())
+        standing = before.cloud.select(~before.ground.bare)
+        template = Template(region, T_goal[:3, 3], _beside(standing, T_goal, region), views)
+        parts = _parts(region, payload, T_goal[:3, 3], config)
+        turns = equal_turns(region.cloud)
+        self.sought, self._ask = Sought(config, step, region, template, parts, turns, verifier), ask
+        self._middles = [middle(region.cloud.points)]
+        if region.context is not None:
+            self._middles.append(middle(region.whole.points))
+        self._half_turn = half_turn(thing_of(parts[0].coarse, standing.points))
+
+    def match(self, query: Scene, hints: Sequence[FloatArray] = ()) -> tuple[Hypothesis, ...]:
+        """Where the region is in the query, likeliest first; see `PreparedStep.match`."""
+        ranked: tuple[Hypothesis, ...] = ()
+        for pool in self.pools(query, hints):
+            ranked = pool.ranked()
+            if ranked and ranked[0].score >= self.sought.config.enough:
+                break
+        return ranked
+
+    def pools(self, query: Scene, hints: Sequence[FloatArray]) -> Iterator[Pool]:
+        """The candidates after each stage, cheap ones first; every pool holds those before it."""
+        if len(query.fused) < SMALLEST:
+            return
+        T_repeated = query.observation.T_world_gripper @ se3.invert(
+            self.sought.step.before.observation.T_world_gripper
+        )
+        if len(hints):
+            bare = query.ground.bare
+            standing = query.fused.select(~bare)
+            near = standing.select(self._around(standing.points, [*hints, T_repeated]))
+            near = without_held(near, query, self.sought.region)
+            if len(near) >= SMALLEST:
+                pool = Pool(self.sought, Target(query, near), hints, T_repeated, None)
+                self._followed(pool)
+                yield pool
+        standing = without_held(query.cloud.select(~query.ground.bare), query, self.sought.region)
+        if len(standing) < SMALLEST:
+            return
+        pool = Pool(self.sought, Target(query, standing), hints, T_repeated, self._ask(query))
+        self._followed(pool)
+        self._fitted(pool)
+        yield pool
+        self._searched(pool)
+        yield pool
+        self._anywhere(pool)
+        yield pool
+
+    def _followed(self, pool: Pool) -> None:
+        """What was done before goes on."""
+        whole = self.sought.parts[0]
+        for name, T in (("hint", T) for T in pool.hints):
+            pool.add(name, [T, pool.finished(whole, T)])
+        pool.add("gripper", [pool.T_repeated, pool.finished(whole, pool.T_repeated)])
+
+    def _fitted(self, pool: Pool) -> None:
+        """What most matches agree on."""
+        assert pool.asked is not None
+        for name, T in pool.asked.fits.items():
+            pool.add(name, [pool.moved(part, T) for part in self.sought.parts[:2]])
+        self._turned(pool)
+
+    def _searched(self, pool: Pool) -> None:
+        """What some matches agree on, for each part of the region."""
+        assert pool.asked is not None
+        points, labels = pool.target.cloud.points, pool.target.labels
+        for part in self.sought.parts:
+            matches = pool.asked.matches.of(part.fine)
+            if part.name != "firm":
+                middles = self._middles if part.name == "region" else [middle(part.fine)]
+                seeds = [matches.motions(), matches.upright(points, labels, middles)]
+                pool.search(part, np.concatenate(seeds))
+        self._turned(pool)
+
+    def _anywhere(self, pool: Pool) -> None:
+        """Every thing, in every turn: the matches may be of a wrong one."""
+        places = pool.target.places(self.sought.config.fewest)
+        if len(places):
+            for part in self.sought.parts:
+                if part.name != "firm":
+                    pool.search(part, upright_motions(middle(part.fine), places), "anywhere")
+            self._turned(pool)
+
+    def _turned(self, pool: Pool) -> None:
+        """The best so far laid down exactly, in its half turn, straight, and upright."""
+        whole, center = self.sought.parts[0], self.sought.center
+        found: dict[str, list[FloatArray]] = {"half_turn": [], "straight": [], "upright": [], "exact": []}
+        for T in pool.best(self.sought.config.tried):
+            found["exact"].append(pool.finished(whole, T))
+            found["upright"].append(upright(T, center))
+            straight = straightened(T, pool.T_repeated, center)
+            for name, other in (("half_turn", T @ self._half_turn), ("straight", straight)):
+                moved = pool.moved(whole, other)
+                found[name] += [moved, upright(moved, center)]
+        for name, motions in found.items():
+            pool.add(name, motions)
+
+    def _around(self, points: FloatArray, motions: Sequence[FloatArray]) -> BoolArray:
+        """(N,) which points (N, 3) have to do with the region after any of the motions (4, 4)."""
+        whole = np.concatenate([self.sought.region.whole.points, self.sought.T_goal[None, :3, 3]])
+        corners = np.stack(np.meshgrid(*np.stack([whole.min(axis=0), whole.max(axis=0)]).T), axis=-1)
+        reached = np.zeros(len(points), dtype=bool)
+        for T in motions:
+            box = se3.apply(T, corners.reshape(-1, 3))
+            reached |= inside_box(points, box.min(axis=0) - BESIDE, box.max(axis=0) + BESIDE)
+        return reached
+
+
+def without_held(cloud: PointCloud, query: Scene, region: Region) -> PointCloud:
+    """The part of a query's cloud that is not in the hand, if the region is not what is held."""
+    if not len(region.p_gripper_held):
+        return cloud
+    p_held = se3.apply(query.observation.T_world_gripper, region.p_gripper_held)
+    return cloud.select(~within(cloud.points, p_held, SAME))
+
+
+def _parts(
+    region: Region, payload: PointCloud | None, p_goal: FloatArray, config: PolicyConfig
+) -> tuple[Part, ...]:
+    """The region itself, what of it stays in place, what is next to the gripper, and what it takes."""
+    points = region.cloud.points
+    rng = np.random.default_rng(0)
+    trust = 1 / (1 + (region.spreads / 0.005) ** 2)
+    drawn = rng.choice(len(points), min(1000, 4 * len(points)), p=trust / trust.sum())
+    parts = [_part("region", 0, points), Part("firm", 3, points[drawn[:250]], points[drawn])]
+    near = region.next_to(p_goal, config.next_to).cloud.points
+    if SMALLEST <= len(near) < 0.8 * len(points):
+        parts.append(_part("part", 2, near))
+    if payload is not None:
+        parts.append(_part("payload", 2, payload.points))
+    return tuple(parts)
+
+
+def _part(name: str, column: int, points: FloatArray) -> Part:
+    coarse, fine = farthest_points(points, 250), farthest_points(points, 1000)
+    return Part(name, column, points[coarse], points[fine])
+
+
+def _beside(standing: PointCloud, T_goal: FloatArray, region: Region) -> PointCloud:
+    """What stands around the place that the tip goes to; the region if nothing does."""
+    near = np.linalg.norm(standing.points - T_goal[:3, 3], axis=1) < BESIDE
+    cloud = standing.select(near) if near.any() else region.cloud
+    return cloud.select(farthest_points(cloud.points, 150))

@@ -1,0 +1,206 @@
+"""What the verification network is trained on: candidates of the search itself, and which of them are right.
+
+python -m imop.training.cases --out DIR --cases N --seed S [--weights FOLDER] [--jobs J] [--mix ...]
+
+A case is one step of a procedural demonstration and one scene in which it has to be done. The networks find
+its region, the search proposes motions stage by stage, and the known poses say which of them take the gripper
+to where it may go.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import tyro
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from imop.candidates.matchers import DescribedMatcher, VerifiedMatcher
+from imop.candidates.pool import Pool
+from imop.candidates.verification import beside_rivals
+from imop.files import replaced
+from imop.geometry import se3
+from imop.geometry.accuracy import COARSE
+from imop.geometry.perception import Perception
+from imop.networks.model import BUNDLED, Model, load_model
+from imop.policy.matcher import Scene, Transition
+from imop.robots.panda import panda_self_filter
+from imop.training.families import TRAINING
+from imop.training.families.thing import Family
+from imop.training.instances import shares
+from imop.training.synthetic import synthetic_scenes
+from imop.training.takes import Example, Take
+from imop.types import Action, BoolArray, Float32Array, FloatArray
+
+# Share of the later steps that are asked as the first of an episode, too.
+AFRESH = 0.3
+# Share of the others that are told what the search answered before; the rest is told what was right.
+ANSWERED = 0.7
+# How far the motion that was found for the step before may be off, metres and radians.
+HINT_OFF = (0.003, 0.03)
+# Share of the cases that the search without learned matches gives.
+REGISTERED = 0.15
+_PER_FILE = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Cases:
+    """Candidates of several cases.
+
+    Attributes:
+        inputs: (N, INPUTS) of the verification network.
+        right: (N,) whether the candidate is right.
+        case: (N,) the number of the case and stage that it belongs to, not decreasing.
+        last: (N,) whether that is the last stage of the search.
+    """
+
+    inputs: Float32Array
+    right: BoolArray
+    case: NDArray[np.int64]
+    last: BoolArray
+
+
+def make_cases(
+    model: Model, families: Mapping[str, Family], mix: Sequence[float], seed: int, count: int
+) -> list[list[tuple[Float32Array, BoolArray]]]:
+    """For each of `count` cases, for each stage of the search: inputs (H, INPUTS), (H,) which are right."""
+    rng = np.random.default_rng((seed, 7))
+    found: list[list[tuple[Float32Array, BoolArray]]] = []
+    perception = Perception(panda_self_filter().is_robot)
+    matchers = VerifiedMatcher(model), DescribedMatcher(model)
+    streams = {v: synthetic_scenes(families, v, seed) for v in shares(mix)}
+    while len(found) < count:
+        variation = rng.choice(list(streams), p=list(shares(mix).values()))
+        for group in _executions(next(streams[variation])):
+            matcher = matchers[int(rng.random() < REGISTERED)]
+            prepared = matcher.prepare(_transitions(group[0].shown, perception))
+            answers: dict[int, FloatArray] = {}
+            for example in group:
+                hints = _hints(example, group, answers, rng)
+                observation = example.asked.observations[example.step]
+                query = Scene(observation, perception.points(observation))
+                stages = []
+                for pool in prepared[example.step].search.pools(query, hints):
+                    if pool.motions:
+                        stages.append(_judged(pool, example))
+                        answers[example.step] = pool.best(1)[0]
+                found.append(stages)
+    return found[:count]
+
+
+def _executions(examples: Sequence[Example]) -> list[list[Example]]:
+    """The examples of a scene by demonstration and query, in the order of their steps."""
+    groups: dict[tuple[int, int], list[Example]] = {}
+    for example in examples:
+        groups.setdefault((id(example.shown), id(example.asked)), []).append(example)
+    return list(groups.values())
+
+
+def _transitions(take: Take, perception: Perception) -> list[Transition]:
+    scenes = [Scene(observation, perception.points(observation)) for observation in take.observations]
+    return [
+        Transition(scenes[k], scenes[k + 1], Action(state.T_world_gripper, state.gripper_open))
+        for k, state in enumerate(take.states[1:])
+    ]
+
+
+def _hints(
+    example: Example, group: Sequence[Example], answers: Mapping[int, FloatArray], rng: np.random.Generator
+) -> list[FloatArray]:
+    """What was done before: what the search answered then, right or wrong, or about what was right.
+
+    Nothing for the first step, and for some others.
+    """
+    before = next((e for e in group if e.step == example.step - 1), None)
+    if before is None or rng.random() < AFRESH:
+        return []
+    if before.step in answers and rng.random() < ANSWERED:
+        return [answers[before.step]]
+    distance, angle = HINT_OFF
+    right = before.pair.T_query_support
+    T = right[int(rng.integers(len(right)))]
+    p = se3.apply(T, example.pair.T_world_goal[None, :3, 3])[0]
+    R = se3.euler(*rng.normal(0, angle / 2, 3))
+    off = se3.make(R, p - R @ p + rng.normal(0, distance, 3))
+    return [off @ T]
+
+
+def _judged(pool: Pool, example: Example) -> tuple[Float32Array, BoolArray]:
+    goals = pool.goals()
+    inputs = beside_rivals(pool.evidence(), goals).astype(np.float32)
+    return inputs, right_goals(goals, example.pair.T_query_support @ example.pair.T_world_goal)
+
+
+def right_goals(goals: FloatArray, right: FloatArray) -> BoolArray:
+    """(H,) which poses (H, 4, 4) are one of the right ones (S, 4, 4), or between two of a round thing."""
+    distance, angle = COARSE
+    round_thing = len(right) >= 12
+    limit = np.radians(max(angle, 16.0 if round_thing else 0.0))
+    return np.asarray(se3.near(goals[:, None], right[None], distance, limit).any(axis=1))
+
+
+def write_cases(cases: Sequence[Sequence[tuple[Float32Array, BoolArray]]], path: Path) -> None:
+    """One file, whole or not at all."""
+    stages = [(inputs, right, k + 1 == len(case)) for case in cases for k, (inputs, right) in enumerate(case)]
+    sizes = [len(right) for _, right, _ in stages]
+    with replaced(path) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(
+            file,
+            inputs=np.concatenate([inputs for inputs, _, _ in stages]),
+            right=np.concatenate([right for _, right, _ in stages]),
+            case=np.repeat(np.arange(len(stages)), sizes),
+            last=np.repeat([last for _, _, last in stages], sizes),
+        )
+
+
+def read_cases(folder: Path) -> Cases:
+    """All cases of a folder."""
+    parts, start = [], 0
+    for path in sorted(folder.glob("*.npz")):
+        with np.load(path) as file:
+            parts.append((file["inputs"], file["right"], file["case"] + start, file["last"]))
+            start += int(file["case"].max()) + 1
+    return Cases(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+
+@dataclass(frozen=True)
+class CasesConfig:
+    """How to make cases.
+
+    Attributes:
+        out: folder of the files; those that are there already are kept.
+        cases: how many.
+        seed: of everything that is drawn.
+        weights: folder of the networks that search.
+        mix: shares of cases with the same things, others in colour, in shape, in both.
+        jobs: processes.
+    """
+
+    out: Path
+    cases: int
+    seed: int = 0
+    weights: Path = BUNDLED
+    mix: tuple[float, float, float, float] = (0.35, 0.1, 0.25, 0.3)
+    jobs: int = 1
+
+
+def _file(config: CasesConfig, number: int) -> None:
+    path = config.out / f"cases-{number:05d}.npz"
+    if not path.exists():
+        content = int(np.random.SeedSequence([config.seed, number]).generate_state(1)[0])
+        made = make_cases(load_model(config.weights), TRAINING, config.mix, content, _PER_FILE)
+        write_cases(made, path)
+        print(path, flush=True)
+
+
+def main() -> None:
+    """Command line."""
+    config = tyro.cli(CasesConfig, description=__doc__)
+    config.out.mkdir(parents=True, exist_ok=True)
+    files = -(-config.cases // _PER_FILE)
+    Parallel(n_jobs=config.jobs)(delayed(_file)(config, number) for number in range(files))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,158 @@
+"""Training of the verification network on cases; a minute on a CPU.
+
+python -m imop.training.verification --cases DIR [DIR ...] --weights FOLDER --out FOLDER
+"""
+
+import json
+import shlex
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+import tyro
+from torch import Tensor
+from torch.nn import functional as F
+
+from imop.networks.model import BUNDLED, CARD, load_model, save_model
+from imop.networks.verification import VerificationNetwork
+from imop.training.cases import Cases, read_cases
+
+
+@dataclass(frozen=True)
+class VerificationTraining:
+    """How to train.
+
+    Attributes:
+        cases: folders of cases.
+        out: folder of the weights, with all other networks as they were.
+        weights: folder of the other networks.
+        held: share of the cases that are kept for the report.
+        steps: of AdamW.
+        batch: candidates' cases per step.
+        learning_rate: at its peak.
+        weight_decay: of AdamW.
+        dropout: share of the inputs that are replaced by their mean.
+        seed: of weights, order and split.
+    """
+
+    cases: tuple[Path, ...]
+    out: Path
+    weights: Path = BUNDLED
+    held: float = 0.15
+    steps: int = 4000
+    batch: int = 64
+    learning_rate: float = 2e-3
+    weight_decay: float = 0.05
+    dropout: float = 0.05
+    seed: int = 0
+
+
+class _Grouped:
+    """Cases as tensors, by case."""
+
+    def __init__(self, cases: Cases, which: set[int]) -> None:
+        kept = np.isin(cases.case, sorted(which))
+        self.inputs, self.right = torch.from_numpy(cases.inputs[kept]), torch.from_numpy(cases.right[kept])
+        starts = np.flatnonzero(np.diff(cases.case[kept], prepend=-1))
+        self.ranges = list(zip(starts, [*starts[1:], len(self.right)], strict=True))
+
+    def take(self, which: np.ndarray) -> tuple[Tensor, Tensor, Tensor]:
+        """Inputs, which are right, and the case of each candidate."""
+        index = np.concatenate([np.arange(*self.ranges[i]) for i in which])
+        case = np.repeat(np.arange(len(which)), [self.ranges[i][1] - self.ranges[i][0] for i in which])
+        return self.inputs[index], self.right[index], torch.from_numpy(case)
+
+
+def loss(logits: Tensor, right: Tensor, case: Tensor) -> Tensor:
+    """Cross entropy of each candidate, and of the choice among those of a case; the mean over cases.
+
+    Args:
+        logits: (N,).
+        right: (N,) whether the candidate is right.
+        case: (N,) the number of its case, from 0 on.
+    """
+    count = int(case.max()) + 1
+    each = F.binary_cross_entropy_with_logits(logits, right.to(logits), reduction="none")
+    sizes = torch.bincount(case, minlength=count)
+    single = logits.new_zeros(count).index_add(0, case, each) / sizes
+    some = torch.zeros(count).index_add(0, case, right.float()) > 0
+    total, good = (_logsumexp(x, case, count) for x in (logits, logits.masked_fill(~right, -1e4)))
+    choice = torch.where(some, total - good, 0.0).sum() / some.sum().clamp_min(1)
+    return single.mean() + 0.5 * choice
+
+
+def _logsumexp(x: Tensor, case: Tensor, count: int) -> Tensor:
+    top = x.detach().new_full((count,), -1e9).scatter_reduce(0, case, x.detach(), "amax")
+    return top + x.new_zeros(count).index_add(0, case, (x - top[case]).exp()).log()
+
+
+def fit(network: VerificationNetwork, cases: Cases, config: VerificationTraining) -> dict[str, float]:
+    """Train the network in place; returns what it reaches on the cases that were kept apart."""
+    rng = np.random.default_rng(config.seed)
+    torch.manual_seed(config.seed)
+    files = cases.case
+    known = np.unique(files)
+    held = set(known[-max(1, round(config.held * len(known))) :].tolist())
+    train, test = _Grouped(cases, set(known.tolist()) - held), _Grouped(cases, held)
+    optimizer = torch.optim.AdamW(
+        network.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
+    )
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, config.learning_rate, config.steps)
+    network.train()
+    for _ in range(config.steps):
+        inputs, right, case = train.take(rng.integers(len(train.ranges), size=config.batch))
+        dropped = torch.rand_like(inputs) < config.dropout
+        inputs = torch.where(dropped, network.standardized.mean, inputs)
+        optimizer.zero_grad()
+        torch.autograd.backward(loss(network(inputs), right, case))
+        optimizer.step()
+        schedule.step()
+    network.eval()
+    return {**measure(network, test), "cases": float(len(train.ranges))}
+
+
+def measure(network: VerificationNetwork, cases: _Grouped) -> dict[str, float]:
+    """Of the likeliest candidate of each case: how often right, mean probability, calibration error.
+
+    Returns:
+        right: share of cases whose likeliest candidate is right. possible: share with any right one.
+        calibration: expected calibration error over ten bins of equal size.
+    """
+    p = network.probability(cases.inputs).numpy()
+    best = [a + int(np.argmax(p[a:b])) for a, b in cases.ranges]
+    hit, sure = cases.right.numpy()[best].astype(float), p[best]
+    possible = [bool(cases.right[a:b].any()) for a, b in cases.ranges]
+    bins = np.array_split(np.argsort(sure), 10)
+    error = sum(abs(hit[b].mean() - sure[b].mean()) * len(b) for b in bins if len(b)) / len(hit)
+    return {
+        "right": float(hit.mean()),
+        "possible": float(np.mean(possible)),
+        "sure": float(sure.mean()),
+        "calibration": float(error),
+    }
+
+
+def main() -> None:
+    """Command line."""
+    config = tyro.cli(VerificationTraining, description=__doc__)
+    parts = [read_cases(folder) for folder in config.cases]
+    starts = np.cumsum([0, *(int(part.case.max()) + 1 for part in parts[:-1])])
+    cases = Cases(
+        np.concatenate([part.inputs for part in parts]),
+        np.concatenate([part.right for part in parts]),
+        np.concatenate([part.case + start for part, start in zip(parts, starts, strict=True)]),
+        np.concatenate([part.last for part in parts]),
+    )
+    model = load_model(config.weights)
+    model.verification = VerificationNetwork(model.config.verification)
+    reached = fit(model.verification, cases, config)
+    print(", ".join(f"{name} {value:.3f}" for name, value in reached.items()))
+    card = json.loads((config.weights / CARD).read_text())
+    card["verification"] = {"command": shlex.join(sys.argv), **reached}
+    save_model(model, config.out, card)
+
+
+if __name__ == "__main__":
+    main()

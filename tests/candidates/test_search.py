@@ -1,0 +1,173 @@
+"""One search in one scene, on boxes: what is proposed, laid down, told apart, and when it ends."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from imop.candidates.pool import Asked, PolicyConfig, Target
+from imop.candidates.proposals import Matches
+from imop.candidates.search import StepSearch, without_held
+from imop.candidates.verification import Verifier, beside_rivals, rivals
+from imop.geometry import se3
+from imop.geometry.cloud import concatenate
+from imop.networks.verification import EVIDENCE, INPUTS
+from imop.policy.region import Region
+from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, scene, transitions
+
+HOME = above(0.0, -0.3, 1.2)
+GRASP = above(0.1, 0.1, TABLE + 0.05)
+SIZE = (0.1, 0.05, 0.06)
+HERE, THERE = at(0.1, 0.1), at(0.3, -0.2, yaw=1.2)
+T = THERE @ se3.invert(HERE)
+CLOUD = box(SIZE, RED, HERE)
+NOTHING = Matches(*(np.zeros((0, 3)) for _ in range(4)), np.zeros(0))
+
+
+class Exact(torch.nn.Module):
+    """What is explained exactly and in its colours is right."""
+
+    def probability(self, inputs):
+        column = {name: inputs[:, k] for k, name in enumerate(EVIDENCE)}
+        assert inputs.shape[1] == INPUTS
+        return (column["region_exact"] * column["region_color"] * column["backward_exact"]).clamp(0, 1)
+
+
+def search(fits=None, matches=NOTHING, asked=None, **settings):
+    region = Region(CLOUD, np.ones(len(CLOUD)), np.zeros((0, 3)), spread=np.full(len(CLOUD), 0.001))
+    step = transitions([scene([CLOUD], HOME), scene([CLOUD], GRASP)], [(GRASP, False)])[0]
+
+    def ask(query):
+        if asked is not None:
+            asked.append(query)
+        return Asked(fits or {}, matches)
+
+    return StepSearch(PolicyConfig(**settings), step, region, None, Verifier(Exact()), ask)
+
+
+def query(*poses, T_world_gripper=HOME):
+    return scene([box(SIZE, RED, pose, seed=1 + k) for k, pose in enumerate(poses)], T_world_gripper)
+
+
+def off(candidate, pose=THERE):
+    """Metres, and radians but for a half turn: the box has two."""
+    angle = float(se3.rotation_distance(candidate.T_query_support @ HERE, pose))
+    return se3.translation_distance(candidate.T_query_support @ HERE, pose), min(angle, np.pi - angle)
+
+
+def test_a_fit_that_is_nearly_right_is_laid_down_exactly():
+    found = search({"fit": at(0.008, -0.006, 0.0) @ T}).match(query(THERE), [])
+    distance, angle = off(found[0])
+    assert distance < 0.003 and angle < 0.05 and found[0].probability > 0.8
+    assert (
+        np.linalg.norm(
+            se3.apply(found[0].T_query_support, found[0].p_support) - found[0].p_query, axis=1
+        ).max()
+        < 0.02
+    )
+
+
+def test_what_no_match_leads_to_is_found_anywhere():
+    found = search().match(query(THERE), [])
+    assert off(found[0])[0] < 0.005 and found[0].generator in ("anywhere", "half_turn", "exact", "upright")
+
+
+def test_a_hint_that_holds_needs_no_matcher():
+    asked = []
+    found = search(asked=asked, enough=0.7).match(query(THERE), [at(0.003, 0.0, 0.0) @ T])
+    assert asked == [] and off(found[0])[0] < 0.003
+
+
+def test_what_is_gone_is_looked_for_elsewhere():
+    asked = []
+    found = search({"fit": T}, asked=asked).match(query(THERE), [at(0.0, 0.3, 0.0)])
+    assert len(asked) == 1 and off(found[0])[0] < 0.003
+
+
+def test_two_equal_things_are_two_candidates():
+    other = at(0.0, 0.2)
+    found = search().match(query(THERE, other), [])
+    for pose in (THERE, other):
+        assert min(off(c, pose)[0] for c in found if c.probability > 0.7) < 0.01
+
+
+def test_of_several_things_the_one_of_the_same_colour_is_likelier():
+    boxes = [box(SIZE, RED, THERE, seed=1), box(SIZE, BLUE, at(0.0, 0.2), seed=2)]
+    found = search().match(scene(boxes, HOME), [])
+    assert off(found[0])[0] < 0.005
+
+
+def test_no_candidate_is_listed_twice_and_the_likeliest_is_first():
+    found = search({"fit": T, "firm": T}).match(query(THERE), [])
+    p = [c.probability for c in found]
+    assert p == sorted(p, reverse=True)
+    goals = np.stack([c.T_query_support for c in found])
+    near = se3.near(goals[:, None], goals[None], 1e-4, 1e-3)
+    assert near.sum() == len(found)
+
+
+def test_every_pool_holds_the_ones_before_it():
+    sizes = [len(pool.motions) for pool in search({"fit": T}).pools(query(THERE), [])]
+    assert sizes == sorted(sizes) or len(sizes) == 3
+    pool = list(search({"fit": T}).pools(query(THERE), []))[-1]
+    assert pool.evidence().shape == (len(pool.motions), len(EVIDENCE)) and np.isfinite(pool.evidence()).all()
+    assert len(pool.generators) == len(pool.motions)
+
+
+def test_an_empty_scene_has_no_candidates():
+    empty = query()
+    bare = type(empty)(empty.observation, empty.fused.select(np.arange(0)))
+    assert search().match(bare, []) == () and search().match(empty, []) == ()
+
+
+def test_every_thing_has_its_place_and_small_ones_can_be_left_out():
+    cubes = [box((0.04, 0.04, 0.04), RED, at(x, 0.1), seed=k) for k, x in enumerate((0.0, 0.2))]
+    crumb = box((0.01, 0.01, 0.01), BLUE, at(0.4, 0.1))
+    target = Target(scene([], HOME), concatenate([*cubes, crumb]))
+    assert len(target.places(1)) == 3
+    places = target.places(len(crumb) + 1)
+    np.testing.assert_allclose(places[places[:, 0].argsort(), 0], (0.0, 0.2), atol=0.003)
+    assert len(target.places(10**6)) == 0
+
+
+def test_points_without_normals_get_them_from_themselves():
+    cube = box((0.08, 0.08, 0.08), RED, at(0.1, 0.1), spacing=0.003)
+    found = Target(scene([], HOME), replace(cube, normals=None)).cloud
+    np.testing.assert_array_equal(found.points, cube.points)
+    # Those of the sides may point either way for a camera straight above.
+    assert np.quantile(np.abs(np.einsum("ij,ij->i", found.normals, cube.normals)), 0.2) > 0.99
+    assert np.all(np.einsum("ij,ij->i", found.normals, np.array([0, 0, 2]) - found.points) >= 0)
+
+
+def test_what_is_in_the_hand_is_left_out_unless_it_is_the_region():
+    hand = above(0.2, 0.1, 1.0)
+    held, other = box((0.04, 0.04, 0.04), RED, at(0.2, 0.1, 0.98)), box(SIZE, BLUE, at(0.0, -0.1))
+    seen = scene([held, other], hand)
+    p_held = se3.apply(se3.invert(hand), held.points)
+    ones = np.ones(len(other)), np.ones(len(held))
+    left = without_held(seen.cloud, seen, Region(other, ones[0], p_held))
+    assert left.points[:, 2].max() < TABLE + 0.07 and len(left) == len(seen.cloud) - len(held)
+    assert without_held(seen.cloud, seen, Region(held, ones[1], p_held[:0])) is seen.cloud
+
+
+def test_rivals_are_elsewhere():
+    poses = np.stack([GRASP, at(0.01, 0.0, 0.0) @ GRASP, at(0.05, 0.0, 0.0) @ GRASP])
+    np.testing.assert_array_equal(
+        rivals(poses), [[False, False, True], [False, False, True], [True, True, False]]
+    )
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2], [2, 0, 1]])
+def test_candidates_are_compared_with_the_best_rival_in_any_order(order):
+    rng = np.random.default_rng(0)
+    evidence = rng.random((3, len(EVIDENCE)))
+    goals = np.stack([GRASP, at(0.005, 0.0, 0.0) @ GRASP, at(0.3, 0.0, 0.0) @ GRASP])
+    inputs = beside_rivals(evidence[order], goals[order])[np.argsort(order)]
+    assert inputs.shape == (3, INPUTS)
+    k = EVIDENCE.index("region_exact")
+    to_best, to_rival = inputs[:, len(EVIDENCE)], inputs[:, -5]
+    np.testing.assert_allclose(to_best, evidence[:, k] - evidence[:, k].max())
+    best = evidence[:2, k].max()
+    np.testing.assert_allclose(to_rival[:2], evidence[:2, k] - evidence[2, k])
+    np.testing.assert_allclose(to_rival[2], evidence[2, k] - best)

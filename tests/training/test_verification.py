@@ -1,0 +1,77 @@
+"""Training of the verification on cases, and the cases themselves."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from imop.geometry import se3
+from imop.networks.model import BUNDLED, load_model
+from imop.networks.verification import INPUTS, VerificationConfig, VerificationNetwork
+from imop.training.cases import Cases, make_cases, read_cases, right_goals, write_cases
+from imop.training.families import TRAINING
+from imop.training.verification import VerificationTraining, fit, loss
+
+
+def some(rng, cases=60):
+    """Cases in which the candidate with the largest first number is right, if that is large."""
+    inputs, right, case = [], [], []
+    for k in range(cases):
+        x = rng.normal(size=(6, INPUTS)).astype(np.float32)
+        inputs.append(x)
+        right.append((x[:, 0] == x[:, 0].max()) & (x[:, 0] > 0.3))
+        case.append(np.full(6, k))
+    return Cases(*(np.concatenate(c) for c in (inputs, right, case)), np.ones(6 * cases, dtype=bool))
+
+
+def test_what_decides_is_learned(tmp_path):
+    torch.manual_seed(0)
+    network = VerificationNetwork(VerificationConfig(width=16))
+    reached = fit(network, some(np.random.default_rng(0), 300), VerificationTraining((), tmp_path, steps=400))
+    assert reached["right"] > 0.65 * reached["possible"] > 0.6
+    assert reached["calibration"] < 0.25
+
+
+def test_the_loss_by_hand():
+    logits, right = torch.tensor([0.0, 0.0, 0.0]), torch.tensor([True, False, False])
+    # Two candidates of which one is right, and one that is wrong and has nothing to choose from.
+    value = loss(logits, right, torch.tensor([0, 0, 1]))
+    assert value.item() == pytest.approx(math.log(2) + 0.5 * math.log(2), rel=1e-5)
+
+
+def test_a_case_counts_once_however_many_candidates_it_has():
+    few = loss(torch.tensor([1.0, -1.0]), torch.tensor([False, False]), torch.tensor([0, 1]))
+    many = loss(
+        torch.tensor([1.0, 1.0, 1.0, -1.0]), torch.zeros(4, dtype=torch.bool), torch.tensor([0, 0, 0, 1])
+    )
+    assert few.item() == pytest.approx(many.item())
+
+
+def test_candidates_near_to_a_right_pose_are_right():
+    right = np.stack([np.eye(4), se3.make(se3.euler(z=2.0), (0.3, 0.0, 0.0))])
+    near, far, turned = se3.make(p=(0.015, 0, 0)), se3.make(p=(0.025, 0, 0)), se3.make(se3.euler(z=0.2))
+    found = right_goals(np.stack([near, far, right[1], turned]), right)
+    assert found.tolist() == [True, False, True, False]
+
+
+def test_between_two_turns_of_a_round_thing_everything_is_right():
+    turns = np.stack([se3.make(se3.euler(z=2 * np.pi * k / 12)) for k in range(12)])
+    assert right_goals(se3.make(se3.euler(z=np.pi / 12))[None], turns).all()
+
+
+def test_cases_are_made_again_written_and_read(tmp_path):
+    model = load_model(BUNDLED)
+    families = {name: TRAINING[name] for name in ("block", "tray")}
+    made, again = (make_cases(model, families, (1.0, 0.0, 0.0, 0.0), 3, 1) for _ in range(2))
+    for one, other in zip(made, again, strict=True):
+        for (inputs, right), (same, as_right) in zip(one, other, strict=True):
+            np.testing.assert_array_equal(inputs, same)
+            np.testing.assert_array_equal(right, as_right)
+    write_cases(made, tmp_path / "cases-00000.npz")
+    write_cases(again, tmp_path / "cases-00001.npz")
+    found = read_cases(tmp_path)
+    stages = [stage for case in made for stage in case]
+    assert found.inputs.shape == (2 * sum(len(right) for _, right in stages), INPUTS)
+    assert found.case.max() + 1 == 2 * len(stages) and (np.diff(found.case) >= 0).all()
+    assert found.right.mean() > 0 and np.isfinite(found.inputs).all()
