@@ -1,4 +1,4 @@
-"""Arrows point one way: types <- geometry <- demos <- networks <- policy <- candidates <- training <- evaluation <- cli."""
+"""Arrows point one way: types <- geometry <- demos <- networks <- policy <- candidates <- training <- evaluation."""
 
 import ast
 from pathlib import Path
