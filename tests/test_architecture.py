@@ -1,4 +1,4 @@
-"""Arrows point one way: types <- geometry <- demos <- networks <- policy <- candidates <- training <- evaluation."""
+"""Arrows point one way: types <- geometry <- demos <- networks <- policy <- candidates <- the rest."""
 
 import ast
 from pathlib import Path
