@@ -50,7 +50,9 @@ def shards(tmp_path_factory):
 
 
 def config(shards, out, networks, **changes):
-    settings = dict(batch=1, learning_rate=6e-3, warm_up=5, every=1000, ema=0.9, workers=0, mixed=False)
+    settings = dict(
+        batch=1, learning_rate=6e-3, warm_up=5, every=1000, ema=0.9, workers=0, precision="float32"
+    )
     return TrainConfig(out, (shards,), networks=networks, **{**settings, "steps": 100, **changes})
 
 

@@ -188,13 +188,13 @@ import sys
 from pathlib import Path
 from tests.training.test_loop import CONFIG, config
 from imop.training.loop import train
-train(config(Path(sys.argv[1]), Path(sys.argv[2]), batch=1, steps=1, mixed=False), CONFIG)
+train(config(Path(sys.argv[1]), Path(sys.argv[2]), batch=1, steps=1, precision="float32"), CONFIG)
 """
 
 
 def test_two_processes_train_as_one(shards, tmp_path):
     """One step of two processes with a pair each is one step with both pairs, up to rounding."""
-    train(config(shards, tmp_path / "one", steps=1, mixed=False), CONFIG)
+    train(config(shards, tmp_path / "one", steps=1, precision="float32"), CONFIG)
     (tmp_path / "worker.py").write_text(WORKER)
     root = Path(__file__).parents[2]
     paths = f"{root / 'src'}{os.pathsep}{root}"

@@ -36,7 +36,6 @@ class PolicyConfig:
         next_to: what of the region is this near to where the gripper goes is a part of its own, metres.
         same_motion: motions nearer to each other than this, metres and radians, are judged once.
         fewest: a thing of fewer points is none.
-        threads: of the matching network; the small one loses more by waiting for a second than that does.
     """
 
     enough: float = 0.9
@@ -50,7 +49,6 @@ class PolicyConfig:
     next_to: float = 0.05
     same_motion: tuple[float, float] = (0.002, 0.02)
     fewest: int = 30
-    threads: int = 1
 
 
 class Target:

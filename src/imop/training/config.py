@@ -34,7 +34,8 @@ class TrainConfig:
         validation_pairs: how many pairs, or routes, of each folder.
         seed: of weights, data and augmentation.
         workers: processes that prepare samples.
-        mixed: whether products within the networks are made in bfloat16; sums and places stay in float32.
+        precision: of products within the networks; sums and places stay in float32. auto is bfloat16 where
+            the processor has fast instructions for it: on a GPU, and on a CPU with AVX-512.
     """
 
     out: Path
@@ -56,7 +57,7 @@ class TrainConfig:
     validation_pairs: int = 200
     seed: int = 0
     workers: int = 1
-    mixed: bool = True
+    precision: Literal["auto", "float32", "bfloat16"] = "auto"
 
     def check_numbers(self) -> None:
         """Not done when it is made, where tyro would tell it in its own words.
