@@ -20,7 +20,6 @@ from pathlib import Path
 import numpy as np
 import torch
 import tyro
-from imop.training.depth_noise import DepthNoise
 from joblib import Parallel, delayed
 from rich.console import Console
 from rich.table import Table
@@ -38,6 +37,7 @@ from imop.policy.matcher import Matcher, Transition
 from imop.policy.matcher import Scene as Seen
 from imop.policy.registration import RegistrationMatcher
 from imop.robots.panda import panda_self_filter
+from imop.sim.depth_noise import DepthNoise
 from imop.training.families import HELD_OUT
 from imop.training.families.thing import revolution
 from imop.training.pairs import StepPair

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 import tyro
-from imop.training.depth_noise import DepthNoise
 from rich.console import Console
 from rich.table import Table
 
@@ -25,6 +24,7 @@ from imop.geometry.cloud import crop, fuse
 from imop.geometry.perception import WORKSPACE_LOWER, WORKSPACE_UPPER, Perception
 from imop.geometry.view_alignment import corrected, disagreement, find_errors
 from imop.robots.panda import panda_self_filter
+from imop.sim.depth_noise import DepthNoise
 from imop.types import FloatArray, Observation
 
 # Standard deviations of camera positions (metres) and rotations (degrees).

@@ -2,11 +2,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from imop.training.depth_noise import DepthNoise
 
 from imop.evaluation.trials import Trial
 from imop.geometry import se3
 from imop.geometry.view_alignment import corrected, disagreement, find_errors
+from imop.sim.depth_noise import DepthNoise
 
 
 @pytest.fixture(scope="module")

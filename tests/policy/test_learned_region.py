@@ -8,9 +8,11 @@ import torch
 
 from imop.geometry import se3
 from imop.networks.graph import GraphConfig
+from imop.networks.region import RegionPrediction
 from imop.policy.learned_region import find_shown_regions
 from tests.policy.scenes import BLUE, GREY, RED, TABLE, above, at, box, moved, scene, transitions
 
+SPREAD = 0.007
 HOME = above(0.0, -0.3, 1.2)
 NOTE, CHEST = (0.09, 0.06, 0.02), (0.2, 0.2, 0.1)
 TOP = TABLE + 0.1
@@ -21,7 +23,8 @@ def model(wanted):
 
     def region(batch):
         points = batch.before.points.double().numpy()
-        return [torch.from_numpy(np.where(wanted(points), 5.0, -5.0))]
+        logits = torch.from_numpy(np.where(wanted(points), 5.0, -5.0))
+        return RegionPrediction([logits], torch.full_like(logits, SPREAD))
 
     return SimpleNamespace(config=SimpleNamespace(graph=GraphConfig()), region=region)
 
@@ -47,6 +50,8 @@ def test_what_is_taken_is_told_from_the_rest_of_the_region():
     assert taken is not None and len(taken.cloud) < 0.5 * len(shown[0].region.cloud)
     np.testing.assert_allclose(taken.cloud.points.mean(axis=0), note.points.mean(axis=0), atol=0.01)
     assert shown[1].taken is None and shown[1].holding and not shown[0].holding
+    for step in shown:
+        np.testing.assert_allclose(step.region.spread, np.full(len(step.region.cloud), SPREAD))
 
 
 def test_a_region_that_is_what_is_taken_needs_no_telling():

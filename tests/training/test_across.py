@@ -18,7 +18,7 @@ def made(variation, families, count, seed=0):
     rng, found = np.random.default_rng(seed), []
     while len(found) < count:
         try:
-            found += pairs_across(families, variation, rng)
+            found += [example.pair for example in pairs_across(families, variation, rng)]
         except Unreachable:
             continue
     return found

@@ -39,7 +39,7 @@ def merge(config: MergeConfig) -> Model:
     Raises:
         CorruptData: if a file cannot be read or does not fit its configuration.
     """
-    taken = {"region": config.pairs, "matching": config.pairs, "graph": config.pairs}
+    taken = dict.fromkeys(("region", "matching", "verification", "graph"), config.pairs)
     if config.routing is not None:
         taken |= {"routing": config.routing, "route_graph": config.routing}
     cards = {folder: _card(folder) for folder in dict.fromkeys(taken.values())}
