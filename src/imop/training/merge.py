@@ -22,7 +22,7 @@ class MergeConfig:
 
     Attributes:
         out: folder for the whole model.
-        pairs: folder with the weights of the region and matching networks.
+        pairs: folder with the weights of the region, matching and verification networks.
         routing: folder with the weights of the routing network; None leaves it untrained.
     """
 
