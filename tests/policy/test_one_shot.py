@@ -42,13 +42,16 @@ def test_poses_are_transferred_to_another_scene(policy, shown, wanted):
         assert action.match.step == number and len(action.match.p_query) > 50
 
 
-def test_exact_cameras_are_left_alone_in_every_state(shown, wanted):
+def test_exact_cameras_are_left_alone(shown, wanted):
     for demonstration in (shown, wanted):
-        for observation in (*(k.observation for k in demonstration.keyframes), demonstration.final):
+        seen = [*(k.observation for k in demonstration.keyframes), demonstration.final]
+        for name, T in find_errors(seen).items():
+            assert np.array_equal(T, np.eye(4)), name
+        for observation in seen:
             for name, T in find_errors([observation]).items():
-                # A state that seems to disagree, by rounding, may be mended by less than a pixel shows.
-                assert se3.translation_distance(T, np.eye(4)) < 3e-4, name
-                assert se3.rotation_distance(T, np.eye(4)) < np.radians(0.05), name
+                # A single state may seem to disagree, where little but slanted faces is seen twice.
+                assert se3.translation_distance(T, np.eye(4)) < 1e-3, name
+                assert se3.rotation_distance(T, np.eye(4)) < np.radians(0.1), name
 
 
 def test_cameras_with_wrong_poses_are_corrected_alike_in_demonstration_and_test(perception, shown, wanted):
