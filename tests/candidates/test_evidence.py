@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from imop.candidates.evidence import OFFSET, Surface, Template, glance, shades, shares
+from imop.candidates.evidence import OFFSET, Surface, Template, glance, shares
 from imop.geometry import se3
 from imop.geometry.cloud import concatenate
 from imop.networks.verification import EVIDENCE
+from imop.policy.evidence import shades
 from imop.policy.region import Region
 from tests.policy.scenes import GREEN, RED, at, box, camera, moved
 

@@ -1,87 +1,16 @@
-"""Where a region may have gone: matches as motions, upright turns, half turns, turns that change nothing."""
+"""What a thing is, and which turns of it change nothing."""
 
 import numpy as np
 import pytest
 
-from imop.candidates.proposals import (
-    TURNS,
-    Matches,
-    equal_turns,
-    half_turn,
-    middle,
-    straightened,
-    thing_of,
-    upright_motions,
-)
+from imop.candidates.proposals import equal_turns, thing_of
 from imop.geometry import se3
 from imop.geometry.cloud import concatenate
-from imop.geometry.clusters import connected
-from tests.policy.scenes import BLUE, RED, TABLE, at, box, colored
+from tests.policy.scenes import BLUE, RED, at, box
+from tests.policy.test_symmetry import can
 
 SIZE = (0.1, 0.05, 0.06)
-HERE, THERE = at(0.1, 0.1), at(0.3, -0.2, yaw=1.2)
-T = THERE @ se3.invert(HERE)
-CENTER = np.array([0.1, 0.1, TABLE])
-
-
-@pytest.fixture
-def matches():
-    cloud = box(SIZE, RED, HERE).select(np.arange(0, 600, 5))
-    wrong = np.arange(len(cloud)) % 4 == 0
-    y = np.where(wrong[:, None], np.roll(cloud.points, 7, axis=0) + 0.2, se3.apply(T, cloud.points))
-    return Matches(cloud.points, cloud.normals, y, se3.rotate(T, cloud.normals), np.ones(len(cloud)))
-
-
-def test_three_quarters_agree_on_the_right_motion(matches):
-    np.testing.assert_allclose(matches.agreement(np.stack([T, np.eye(4)]), 0.015), (0.75, 0.0), atol=0.01)
-
-
-def test_triples_find_the_motion_although_some_matches_are_wrong(matches):
-    assert se3.translation_distance(matches.motions()[0] @ HERE, THERE) < 1e-3
-
-
-def test_part_of_the_region_has_its_own_matches(matches):
-    few = matches.x[:10]
-    part = matches.of(few)
-    assert len(part.x) >= 10 and len(part.x) < len(matches.x)
-    assert np.linalg.norm(part.x[:, None] - few[None], axis=-1).min(axis=1).max() < 0.02
-
-
-def test_without_matches_nothing_is_proposed(matches):
-    none = matches.of(matches.x + 10.0)
-    assert len(none.motions()) == 0
-    assert len(none.upright(matches.y, connected(matches.y), [CENTER])) == 0
-
-
-def test_upright_motions_go_to_the_thing_that_was_matched(matches):
-    cloud = concatenate([box(SIZE, RED, THERE), box(SIZE, BLUE, at(0.0, -0.3))])
-    p = middle(matches.x)
-    turned = matches.upright(cloud.points, connected(cloud.points), [p])
-    # First the mean of the matches, wrong ones included, then the middle of the thing.
-    moved = se3.apply(turned[TURNS : 2 * TURNS], p[None])[:, 0]
-    assert np.linalg.norm(moved[:, :2] - THERE[:2, 3], axis=1).max() < 0.01
-    assert se3.rotation_distance(turned, np.tile(T, (len(turned), 1, 1))).min() < np.radians(7.6)
-
-
-def test_upright_motions_take_the_centre_to_every_place():
-    places = np.array([[0.3, 0.1, 0.8], [0.0, -0.2, 0.9]])
-    motions = upright_motions(CENTER, places)
-    moved = se3.apply(motions, CENTER[None])[:, 0]
-    np.testing.assert_allclose(moved, np.repeat(places, TURNS, axis=0), atol=1e-12)
-    np.testing.assert_allclose(motions[:, 2, 2], 1.0)
-
-
-def test_straightened_goes_to_the_same_place_in_the_other_turn():
-    straight = at(0.5, 0.5, 0.1, yaw=0.3)
-    moved = straightened(T, straight, CENTER)
-    np.testing.assert_allclose(se3.apply(moved, CENTER[None]), se3.apply(T, CENTER[None]))
-    np.testing.assert_allclose(moved[:3, :3], straight[:3, :3])
-
-
-def test_the_middle_does_not_depend_on_how_much_of_a_side_was_seen():
-    cube = box((0.04, 0.04, 0.04), RED, HERE)
-    half = cube.select((cube.points[:, 0] < 0.1) | (np.arange(len(cube)) % 5 == 0))
-    np.testing.assert_allclose(middle(half.points), middle(cube.points), atol=0.002)
+HERE = at(0.1, 0.1)
 
 
 def test_the_thing_of_a_part_is_all_that_is_connected_to_it():
@@ -89,15 +18,6 @@ def test_the_thing_of_a_part_is_all_that_is_connected_to_it():
     standing = concatenate([one, other]).points
     assert len(thing_of(one.points[:20], standing)) == len(one)
     assert thing_of(one.points, standing[:0]) is one.points
-
-
-def can(radius=0.04, height=0.08, spacing=0.004):
-    rng = np.random.default_rng(0)
-    count = int(2 * np.pi * radius * height / spacing**2)
-    angle = rng.uniform(0, 2 * np.pi, count)
-    out = np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=1)
-    points = radius * out + rng.uniform(0, height, count)[:, None] * [0, 0, 1] + CENTER
-    return colored(points, out, RED)
 
 
 def angles(cloud):
@@ -117,20 +37,3 @@ def test_a_cube_looks_the_same_in_four_turns():
 @pytest.mark.parametrize("size", [(0.12, 0.03, 0.04), (0.2, 0.1, 0.02)])
 def test_half_a_turn_alone_is_not_trusted(size):
     assert list(angles(box(size, RED, HERE))) == [0]
-
-
-@pytest.mark.parametrize("yaw", [0.0, 0.7, 2.0])
-def test_a_half_turn_goes_about_the_base_and_not_about_what_sticks_out(yaw):
-    rng = np.random.default_rng(0)
-    base = rng.uniform((-0.03, -0.1, 0), (0.03, 0.1, 0.03), (1500, 3))
-    spout = rng.uniform((0.03, -0.01, 0.02), (0.15, 0.01, 0.03), (200, 3))
-    pose = at(0.2, 0.1, yaw=yaw)
-    S = half_turn(se3.apply(pose, np.concatenate([base, spout])))
-    assert se3.rotation_distance(S, np.eye(4)) == pytest.approx(np.pi, abs=0.1)
-    center = pose[:3, 3]
-    assert np.linalg.norm((se3.apply(S, center[None])[0] - center)[:2]) < 0.01
-
-
-def test_any_thing_has_a_half_turn():
-    few = np.array([[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.02, 0.0]])
-    assert se3.rotation_distance(half_turn(few), np.eye(4)) == pytest.approx(np.pi)

@@ -1,18 +1,15 @@
 """One search in one scene, on boxes: what is proposed, laid down, told apart, and when it ends."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import torch
 
-from imop.candidates.pool import Asked, PolicyConfig, Target
-from imop.candidates.proposals import Matches
-from imop.candidates.search import StepSearch, without_held
+from imop.candidates.pool import Asked, PolicyConfig
+from imop.candidates.search import StepSearch
 from imop.candidates.verification import Verifier, beside_rivals, rivals
 from imop.geometry import se3
-from imop.geometry.cloud import concatenate
 from imop.networks.verification import EVIDENCE, INPUTS
+from imop.policy.matches import Matches
 from imop.policy.region import Region
 from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, scene, transitions
 
@@ -119,36 +116,6 @@ def test_an_empty_scene_has_no_candidates():
     empty = query()
     bare = type(empty)(empty.observation, empty.fused.select(np.arange(0)))
     assert search().match(bare, []) == () and search().match(empty, []) == ()
-
-
-def test_every_thing_has_its_place_and_small_ones_can_be_left_out():
-    cubes = [box((0.04, 0.04, 0.04), RED, at(x, 0.1), seed=k) for k, x in enumerate((0.0, 0.2))]
-    crumb = box((0.01, 0.01, 0.01), BLUE, at(0.4, 0.1))
-    target = Target(scene([], HOME), concatenate([*cubes, crumb]))
-    assert len(target.places(1)) == 3
-    places = target.places(len(crumb) + 1)
-    np.testing.assert_allclose(places[places[:, 0].argsort(), 0], (0.0, 0.2), atol=0.003)
-    assert len(target.places(10**6)) == 0
-
-
-def test_points_without_normals_get_them_from_themselves():
-    cube = box((0.08, 0.08, 0.08), RED, at(0.1, 0.1), spacing=0.003)
-    found = Target(scene([], HOME), replace(cube, normals=None)).cloud
-    np.testing.assert_array_equal(found.points, cube.points)
-    # Those of the sides may point either way for a camera straight above.
-    assert np.quantile(np.abs(np.einsum("ij,ij->i", found.normals, cube.normals)), 0.2) > 0.99
-    assert np.all(np.einsum("ij,ij->i", found.normals, np.array([0, 0, 2]) - found.points) >= 0)
-
-
-def test_what_is_in_the_hand_is_left_out_unless_it_is_the_region():
-    hand = above(0.2, 0.1, 1.0)
-    held, other = box((0.04, 0.04, 0.04), RED, at(0.2, 0.1, 0.98)), box(SIZE, BLUE, at(0.0, -0.1))
-    seen = scene([held, other], hand)
-    p_held = se3.apply(se3.invert(hand), held.points)
-    ones = np.ones(len(other)), np.ones(len(held))
-    left = without_held(seen.cloud, seen, Region(other, ones[0], p_held))
-    assert left.points[:, 2].max() < TABLE + 0.07 and len(left) == len(seen.cloud) - len(held)
-    assert without_held(seen.cloud, seen, Region(held, ones[1], p_held[:0])) is seen.cloud
 
 
 def test_rivals_are_elsewhere():

@@ -47,3 +47,10 @@ def test_upright_motions_go_to_the_thing_that_was_matched(matches):
     moved = se3.apply(turned[24:], p[None])[:, 0]
     assert np.linalg.norm(moved[:, :2] - THERE[:2, 3], axis=1).max() < 0.01
     assert se3.rotation_distance(turned, np.tile(T, (len(turned), 1, 1))).min() < np.radians(7.6)
+
+
+def test_without_matches_nothing_is_proposed(matches):
+    none = matches.of(matches.x + 10.0)
+    things = Things(scene([], above(0, 0, 1.2)), box(SIZE, RED, THERE))
+    assert len(none.motions(4000, seed=0)) == 0
+    assert len(none.upright(things, 1, 24, [middle(matches.x)])) == 0

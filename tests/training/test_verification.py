@@ -22,7 +22,7 @@ def some(rng, cases=60):
         inputs.append(x)
         right.append((x[:, 0] == x[:, 0].max()) & (x[:, 0] > 0.3))
         case.append(np.full(6, k))
-    return Cases(*(np.concatenate(c) for c in (inputs, right, case)), np.ones(6 * cases, dtype=bool))
+    return Cases(*(np.concatenate(c) for c in (inputs, right, case)))
 
 
 def test_what_decides_is_learned(tmp_path):

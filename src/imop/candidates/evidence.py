@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud, concatenate, farthest_points, project
+from imop.geometry.cloud import PointCloud, concatenate, farthest_points
+from imop.policy.evidence import seen, shades
 from imop.policy.region import Region
-from imop.types import BoolArray, CameraView, Float32Array, FloatArray
+from imop.policy.search import BESIDE
+from imop.types import BoolArray, CameraView, FloatArray
 
 # Farthest counterpart, metres.
 REACH = 0.03
@@ -32,18 +34,10 @@ GRAZING, THROUGH = 0.25, 0.02
 AROUND = 0.04
 # What is next to the gripper: scale of the weights, metres.
 NEXT = 0.05
-# What is around the gripper, metres.
-BESIDE = 0.08
 # Points that are compared: of the region, of its context, and of what was observed around it.
 POINTS, CONTEXT, BACKWARD = 400, 150, 200
 # The same at a glance.
 GLANCE, GLANCE_CONTEXT = 100, 40
-
-
-def shades(colors: Float32Array) -> FloatArray:
-    """Colours (N, 3) of 0 .. 1 as (N, 4) hue and a little brightness, for light changes with a turn."""
-    bright = colors.mean(axis=1, keepdims=True).astype(np.float64)
-    return np.concatenate([(colors - bright) / (bright + 0.05), 0.35 * bright], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,17 +97,7 @@ class Surface:
         A view can if the face lies in its image and turns to it, and nothing nearer stands before it. And
         (K,) True where a view sees through the point to what is farther away.
         """
-        hidden, through = np.ones(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
-        for view in self._views:
-            to_camera = view.T_world_camera[:3, 3] - points
-            distance = np.maximum(np.linalg.norm(to_camera, axis=1), 1e-9)
-            slant = np.einsum("mk,mk->m", to_camera, normals) / distance
-            (column, row), z, inside = (part.T for part in project(view, points))
-            depth = view.depth[row, column]
-            beyond = np.where(inside & np.isfinite(depth) & (depth > 0), depth - z, -np.inf)
-            hidden &= ~((beyond > -THROUGH) & (slant > GRAZING))
-            through |= beyond > THROUGH
-        return hidden, through
+        return seen(self._views, points, normals, THROUGH, GRAZING)
 
 
 class Template:
@@ -150,10 +134,10 @@ class Template:
     @staticmethod
     def _weights(region: Region, chosen: NDArray[np.int64], context: int, p_goal: FloatArray) -> FloatArray:
         """(M, 4) of the region, near the gripper, of what stays in place, and of the context."""
-        weight, spread = region.weight[chosen], region.spreads[chosen]
+        weight = region.weight[chosen]
         away = np.linalg.norm(region.cloud.points[chosen] - p_goal, axis=1)
         near = weight * np.exp(-0.5 * ((away - away.min()) / NEXT) ** 2)
-        firm = weight / (1 + (spread / OFFSET) ** 2)
+        firm = weight * region.trust[chosen]
         own = np.stack([weight, near, firm, np.zeros(len(chosen))], axis=1)
         others = np.tile([0.0, 0.0, 0.0, 1.0], (context, 1))
         return np.concatenate([own, others])
@@ -168,8 +152,8 @@ class Template:
 def glance(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
     """(H, 4) quick looks at motions (H, 4, 4): the region in its colours, its shape, the near, the firm."""
     which = template.glance
-    seen = surface.explain(*template.moved(T, which), *_tiled(template, which, len(T)))
-    loose, color = seen.loose.reshape(len(T), -1), seen.color.reshape(len(T), -1)
+    found = surface.explain(*template.moved(T, which), *_tiled(template, which, len(T)))
+    loose, color = found.loose.reshape(len(T), -1), found.color.reshape(len(T), -1)
     w = template.weights[which]
     values = (loose * color, loose, loose * np.sqrt(color), loose)
     columns = (w[:, 0], w[:, 0], w[:, 1], w[:, 2])

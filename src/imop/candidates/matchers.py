@@ -7,8 +7,7 @@ import numpy as np
 import torch
 
 from imop.candidates.pool import Asked, PolicyConfig
-from imop.candidates.proposals import Matches, likeliest
-from imop.candidates.search import StepSearch, without_held
+from imop.candidates.search import StepSearch
 from imop.candidates.verification import Verifier
 from imop.geometry.cloud import farthest_points
 from imop.geometry.ransac import mutual_matches
@@ -17,8 +16,10 @@ from imop.networks.matching import reposition
 from imop.networks.model import Model
 from imop.policy.learned_region import ShownRegion, find_shown_regions
 from imop.policy.matcher import Hypothesis, Scene, Transition
+from imop.policy.matches import Matches, likeliest
 from imop.policy.region import Region, find_regions
 from imop.policy.registration import RegistrationMatcher
+from imop.policy.things import without_held
 from imop.types import FloatArray
 
 

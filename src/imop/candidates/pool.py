@@ -5,19 +5,17 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imop.candidates.evidence import Surface, Template, glance, shares
-from imop.candidates.proposals import Matches, middle
 from imop.candidates.verification import Verifier
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud, facing
-from imop.geometry.clusters import connected
-from imop.geometry.icp import CLOSE, FINEST, Refiner
-from imop.geometry.perception import viewpoints
+from imop.geometry.cloud import PointCloud
+from imop.geometry.icp import CLOSE, FINEST
 from imop.geometry.ransac import distinct
 from imop.policy.matcher import Hypothesis, Scene, Transition
+from imop.policy.matches import Matches
 from imop.policy.region import Region
+from imop.policy.things import Standing
 from imop.types import FloatArray
 
 
@@ -51,33 +49,16 @@ class PolicyConfig:
     fewest: int = 30
 
 
-class Target:
+class Target(Standing):
     """What of an observed scene the region may be, prepared once.
 
     Attributes:
-        query: the observed scene.
-        cloud: at least `SMALLEST` points, with normals, if need be of these alone.
-        surface: the same, as evidence.
-        refine: lays points onto it.
+        surface: the points as evidence.
     """
 
     def __init__(self, query: Scene, cloud: PointCloud) -> None:
-        self.query, self.refine = query, Refiner(cloud.points)
-        if cloud.normals is None:
-            cloud = facing(cloud, self.refine.normals, viewpoints(query.observation))
-        self.cloud = cloud
-        self.surface = Surface(cloud, tuple(query.observation.views.values()))
-
-    @cached_property
-    def labels(self) -> NDArray[np.int64]:
-        """(N,) number of the connected thing that each point belongs to."""
-        return connected(self.cloud.points)
-
-    def places(self, fewest: int) -> FloatArray:
-        """(P, 3) the middle of each connected thing of at least so many points."""
-        points, labels = self.cloud.points, self.labels
-        large = np.flatnonzero(np.bincount(labels) >= fewest)
-        return np.array([middle(points[labels == label]) for label in large]).reshape(-1, 3)
+        super().__init__(query, cloud)
+        self.surface = Surface(self.cloud, tuple(query.observation.views.values()))
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,25 +4,19 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from imop.candidates.evidence import BESIDE, Template
+from imop.candidates.evidence import Template
 from imop.candidates.pool import Asked, Part, PolicyConfig, Pool, Sought, Target
-from imop.candidates.proposals import (
-    SAME,
-    equal_turns,
-    half_turn,
-    middle,
-    straightened,
-    thing_of,
-    upright_motions,
-)
+from imop.candidates.proposals import NEAR, PLACES, SAMPLES, SEED, TURNS, equal_turns, thing_of
 from imop.candidates.verification import Verifier
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud, farthest_points, inside_box
+from imop.geometry.cloud import PointCloud, farthest_points
 from imop.geometry.icp import SMALLEST, upright
-from imop.geometry.neighbours import within
 from imop.policy.matcher import Hypothesis, Scene, Transition
 from imop.policy.region import Region
-from imop.types import BoolArray, FloatArray
+from imop.policy.search import BESIDE, around, straightened, upright_motions
+from imop.policy.symmetry import half_turn
+from imop.policy.things import middle, without_held
+from imop.types import FloatArray
 
 
 class StepSearch:
@@ -56,7 +50,9 @@ class StepSearch:
         self._middles = [middle(region.cloud.points)]
         if region.context is not None:
             self._middles.append(middle(region.whole.points))
-        self._half_turn = half_turn(thing_of(parts[0].coarse, standing.points))
+        self._half_turn = half_turn(thing_of(parts[0].coarse, standing.points), NEAR)
+        # What is around the goal is evidence, too.
+        self._concerned = np.concatenate([region.whole.points, T_goal[None, :3, 3]])
 
     def match(self, query: Scene, hints: Sequence[FloatArray] = ()) -> tuple[Hypothesis, ...]:
         """Where the region is in the query, likeliest first; see `PreparedStep.match`."""
@@ -77,7 +73,8 @@ class StepSearch:
         if len(hints):
             bare = query.ground.bare
             standing = query.fused.select(~bare)
-            near = standing.select(self._around(standing.points, [*hints, T_repeated]))
+            motions = np.stack([*hints, T_repeated])
+            near = standing.select(around(standing.points, self._concerned, motions))
             near = without_held(near, query, self.sought.region)
             if len(near) >= SMALLEST:
                 pool = Pool(self.sought, Target(query, near), hints, T_repeated, None)
@@ -112,12 +109,12 @@ class StepSearch:
     def _searched(self, pool: Pool) -> None:
         """What some matches agree on, for each part of the region."""
         assert pool.asked is not None
-        points, labels = pool.target.cloud.points, pool.target.labels
         for part in self.sought.parts:
             matches = pool.asked.matches.of(part.fine)
             if part.name != "firm":
                 middles = self._middles if part.name == "region" else [middle(part.fine)]
-                seeds = [matches.motions(), matches.upright(points, labels, middles)]
+                upright_on = matches.upright(pool.target, PLACES, TURNS, middles)
+                seeds = [matches.motions(SAMPLES, SEED), upright_on]
                 pool.search(part, np.concatenate(seeds))
         self._turned(pool)
 
@@ -127,7 +124,7 @@ class StepSearch:
         if len(places):
             for part in self.sought.parts:
                 if part.name != "firm":
-                    pool.search(part, upright_motions(middle(part.fine), places), "anywhere")
+                    pool.search(part, upright_motions(middle(part.fine), places, TURNS), "anywhere")
             self._turned(pool)
 
     def _turned(self, pool: Pool) -> None:
@@ -144,24 +141,6 @@ class StepSearch:
         for name, motions in found.items():
             pool.add(name, motions)
 
-    def _around(self, points: FloatArray, motions: Sequence[FloatArray]) -> BoolArray:
-        """(N,) which points (N, 3) have to do with the region after any of the motions (4, 4)."""
-        whole = np.concatenate([self.sought.region.whole.points, self.sought.T_goal[None, :3, 3]])
-        corners = np.stack(np.meshgrid(*np.stack([whole.min(axis=0), whole.max(axis=0)]).T), axis=-1)
-        reached = np.zeros(len(points), dtype=bool)
-        for T in motions:
-            box = se3.apply(T, corners.reshape(-1, 3))
-            reached |= inside_box(points, box.min(axis=0) - BESIDE, box.max(axis=0) + BESIDE)
-        return reached
-
-
-def without_held(cloud: PointCloud, query: Scene, region: Region) -> PointCloud:
-    """The part of a query's cloud that is not in the hand, if the region is not what is held."""
-    if not len(region.p_gripper_held):
-        return cloud
-    p_held = se3.apply(query.observation.T_world_gripper, region.p_gripper_held)
-    return cloud.select(~within(cloud.points, p_held, SAME))
-
 
 def _parts(
     region: Region, payload: PointCloud | None, p_goal: FloatArray, config: PolicyConfig
@@ -169,8 +148,8 @@ def _parts(
     """The region itself, what of it stays in place, what is next to the gripper, and what it takes."""
     points = region.cloud.points
     rng = np.random.default_rng(0)
-    trust = 1 / (1 + (region.spreads / 0.005) ** 2)
-    drawn = rng.choice(len(points), min(1000, 4 * len(points)), p=trust / trust.sum())
+    share = region.trust / region.trust.sum()
+    drawn = rng.choice(len(points), min(1000, 4 * len(points)), p=share)
     parts = [_part("region", 0, points), Part("firm", 3, points[drawn[:250]], points[drawn])]
     near = region.next_to(p_goal, config.next_to).cloud.points
     if SMALLEST <= len(near) < 0.8 * len(points):

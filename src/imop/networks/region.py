@@ -6,6 +6,7 @@ counterpart may be, seen from the action, if the thing is another one of its kin
 """
 
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import torch
 from torch import Tensor, nn
@@ -13,6 +14,7 @@ from torch import Tensor, nn
 from imop.networks.backbone import Backbone, BackboneConfig, level_relations
 from imop.networks.blocks import MLP, GraphBlock, relation
 from imop.networks.graph import POINT_FEATURES, Graph, nearest_neighbours
+from imop.types import FloatArray
 
 GRIPPER_FEATURES = 16
 # Counterparts are expected within these distances, metres: the noise of the cameras, and what is no part.
@@ -113,7 +115,15 @@ class RegionPrediction:
     @property
     def trust(self) -> Tensor:
         """(M,) weights of a fit to another thing: 1 where nothing is expected to differ, else less."""
-        return 1 / (1 + (self.spread / NOISE).square())
+        return trust(self.spread)
+
+
+Values = TypeVar("Values", Tensor, FloatArray)
+
+
+def trust(spread: Values) -> Values:
+    """Weights of points with a spread, metres, in a fit: 1 / (1 + (spread / `NOISE`)^2)."""
+    return 1 / (1 + (spread / NOISE) ** 2)
 
 
 class RegionNetwork(nn.Module):

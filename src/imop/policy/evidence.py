@@ -114,17 +114,7 @@ class Surface:
         A view can if the face lies in its image and turns to it, and nothing nearer stands before it. And
         (M,) True where a view sees through the point to what is farther away.
         """
-        hidden, through = np.ones(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
-        for view in self._views:
-            to_camera = view.T_world_camera[:3, 3] - points
-            distance = np.maximum(np.linalg.norm(to_camera, axis=1), 1e-9)
-            slant = np.einsum("mk,mk->m", to_camera, normals) / distance
-            (column, row), z, inside = (part.T for part in project(view, points))
-            depth = view.depth[row, column]
-            beyond = np.where(inside & np.isfinite(depth), depth - z, -np.inf)
-            hidden &= ~((beyond > -self.tolerances.depth) & (slant > self.tolerances.grazing))
-            through |= beyond > self.tolerances.depth
-        return hidden, through
+        return seen(self._views, points, normals, self.tolerances.depth, self.tolerances.grazing)
 
     def possible(
         self, cloud: PointCloud, weight: FloatArray, explained: FloatArray, firm: BoolArray | None = None
@@ -156,6 +146,31 @@ class Surface:
         """Weighted share 0 .. 1 of the moved `cloud` that is `explained` (M,); see `possible`."""
         possible = self.possible(moved(cloud, T), weight, explained, firm)
         return float(np.clip((weight * explained).sum() / max(possible.sum(), 1e-9), 0.0, 1.0))
+
+
+def seen(
+    views: Sequence[CameraView], points: FloatArray, normals: FloatArray, behind: float, grazing: float
+) -> tuple[BoolArray, BoolArray]:
+    """What views say of faces at points (M, 3) with normals (M, 3); see `Surface.seen`.
+
+    Args:
+        views: of the scene.
+        points: world frame, metres.
+        normals: of the faces.
+        behind: how far behind a point a camera must see to prove it absent, metres.
+        grazing: cosine of the angle to its normal from which a camera sees a face.
+    """
+    hidden, through = np.ones(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
+    for view in views:
+        to_camera = view.T_world_camera[:3, 3] - points
+        distance = np.maximum(np.linalg.norm(to_camera, axis=1), 1e-9)
+        slant = np.einsum("mk,mk->m", to_camera, normals) / distance
+        (column, row), z, inside = (part.T for part in project(view, points))
+        depth = view.depth[row, column]
+        beyond = np.where(inside & np.isfinite(depth), depth - z, -np.inf)
+        hidden &= ~((beyond > -behind) & (slant > grazing))
+        through |= beyond > behind
+    return hidden, through
 
 
 def moved(cloud: PointCloud, T: FloatArray) -> PointCloud:

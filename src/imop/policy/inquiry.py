@@ -9,7 +9,7 @@ from imop.geometry.icp import CLOSE, FINEST, NEARBY, upright
 from imop.geometry.ransac import distinct
 from imop.policy.evidence import Judge
 from imop.policy.matcher import Hypothesis
-from imop.policy.search import Search, upright_motions
+from imop.policy.search import Search, straightened, upright_motions
 from imop.policy.things import Things, middle
 from imop.types import BoolArray, FloatArray
 
@@ -211,10 +211,7 @@ class Inquiry:
 
     def _as_repeated(self, T: FloatArray) -> FloatArray:
         """The demonstrated motion, carried on to the place where `T` leads to."""
-        p = middle(self._search.coarse[-1])[None]
-        T_repeated = self._T_repeated.copy()
-        T_repeated[:3, 3] += (se3.apply(T, p) - se3.apply(T_repeated, p))[0]
-        return T_repeated
+        return straightened(T, self._T_repeated, middle(self._search.coarse[-1]))
 
     def _near(self, motions: FloatArray, T: FloatArray, center: FloatArray | None = None) -> BoolArray:
         """(H,) which motions carry a point (3,), by default the region's middle, about where `T` does."""

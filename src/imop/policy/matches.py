@@ -1,5 +1,6 @@
 """Which points of the query the points of a region are, as the matching network says it: the paper's C."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from imop.geometry.ransac import agreement, sample_motions
 from imop.networks.graph import Graph
 from imop.policy.contacts import SAME
 from imop.policy.search import upright_motions
-from imop.policy.things import Things, middle
+from imop.policy.things import Standing, middle
 from imop.types import FloatArray
 
 # Share of the matches that must lead to a thing for the region to be set upright on it.
@@ -47,9 +48,11 @@ class Matches:
 
     def motions(self, samples: int, seed: int) -> FloatArray:
         """(H, 4, 4) motions that some matches agree on, from so many triples of them."""
+        if not len(self.x):
+            return np.zeros((0, 4, 4))
         return sample_motions(self.x, self.y, self.n_x, self.n_y, self.weight, samples=samples, seed=seed)
 
-    def upright(self, things: Things, places: int, turns: int, middles: list[FloatArray]) -> FloatArray:
+    def upright(self, things: Standing, places: int, turns: int, middles: Sequence[FloatArray]) -> FloatArray:
         """(H, 4, 4) motions, in every turn, to the things that most of the region was matched to.
 
         Where something is, the matches say long before they say how it is turned.
@@ -60,10 +63,12 @@ class Matches:
             turns: how often, over a full turn.
             middles: points (3,) of the region that may come to the middle of the thing.
         """
+        seeds = [np.zeros((0, 4, 4))]
+        if not len(self.x):
+            return seeds[0]
         points, labels = things.cloud.points, things.labels
         thing = labels[nearest(self.y, points)[1][:, 0]]
         weights = np.bincount(thing, weights=self.weight, minlength=labels.max() + 1)
-        seeds = [np.zeros((0, 4, 4))]
         for label in np.argsort(-weights)[:places]:
             w = self.weight * (thing == label)
             if w.sum() > _SOME * self.weight.sum():

@@ -16,6 +16,7 @@ from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, concatenate
 from imop.geometry.clusters import Objects, find_objects
 from imop.geometry.neighbours import nearest, within
+from imop.networks.region import trust
 from imop.policy.contacts import SAME, Contacts, find_contacts, leaving
 from imop.policy.matcher import Transition
 from imop.types import BoolArray, FloatArray
@@ -66,6 +67,11 @@ class Region:
     def spreads(self) -> FloatArray:
         """(M,) the spread, or a usual one if nothing is known of it."""
         return np.full(len(self.cloud), UNKNOWN) if self.spread is None else self.spread
+
+    @cached_property
+    def trust(self) -> FloatArray:
+        """(M,) weights of a fit to another thing; see `networks.region.trust`."""
+        return trust(self.spreads)
 
     def colorless(self) -> "Region":
         """The same region without its colours."""

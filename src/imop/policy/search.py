@@ -80,12 +80,7 @@ class Search:
 
     def around(self, points: FloatArray, motions: FloatArray) -> BoolArray:
         """(N,) which points (N, 3) have to do with the region after any of the motions (H, 4, 4)."""
-        whole = self.region.whole.points
-        corners = np.stack(np.meshgrid(*np.stack([whole.min(axis=0), whole.max(axis=0)]).T), axis=-1)
-        reached = np.zeros(len(points), dtype=bool)
-        for box in se3.apply(motions, corners.reshape(-1, 3)):
-            reached |= inside_box(points, box.min(axis=0) - BESIDE, box.max(axis=0) + BESIDE)
-        return reached
+        return around(points, self.region.whole.points, motions)
 
     def _thing(self, before: Scene) -> FloatArray:
         """(N, 3) the thing in the demonstrated scene that the region is part of."""
@@ -96,6 +91,22 @@ class Search:
         part_of = labels[nearest(self.coarse[0], points)[1][:, 0]]
         thing: FloatArray = points[labels == np.bincount(part_of).argmax()]
         return thing
+
+
+def around(points: FloatArray, thing: FloatArray, motions: FloatArray) -> BoolArray:
+    """(N,) which points (N, 3) have to do with a thing (M, 3) after any of the motions (H, 4, 4)."""
+    corners = np.stack(np.meshgrid(*np.stack([thing.min(axis=0), thing.max(axis=0)]).T), axis=-1)
+    reached = np.zeros(len(points), dtype=bool)
+    for box in se3.apply(motions, corners.reshape(-1, 3)):
+        reached |= inside_box(points, box.min(axis=0) - BESIDE, box.max(axis=0) + BESIDE)
+    return reached
+
+
+def straightened(T: FloatArray, T_straight: FloatArray, p: FloatArray) -> FloatArray:
+    """(4, 4) the motion `T_straight`, carried on to where `T` takes a point (3,)."""
+    carried = T_straight.copy()
+    carried[:3, 3] += (se3.apply(T, p[None]) - se3.apply(T_straight, p[None]))[0]
+    return carried
 
 
 def upright_motions(center: FloatArray, places: FloatArray, turns: int) -> FloatArray:

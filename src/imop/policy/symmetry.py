@@ -46,8 +46,8 @@ def equal_turns(surface: Surface, center: FloatArray) -> FloatArray:
     return np.stack([np.eye(4), *(T for _, T in found)])
 
 
-def half_turn(points: FloatArray) -> FloatArray:
-    """(4, 4) the half turn about the vertical that best lays a thing (N, 3) onto itself.
+def half_turn(points: FloatArray, near: float = NEAR) -> FloatArray:
+    """(4, 4) the half turn about the vertical that best lays a thing (N, 3) onto itself, `near` in metres.
 
     Most things look alike from both ends, about an axis that need not go through the middle of what was seen:
     a faucet's goes through its base, whichever way the spout points.
@@ -57,17 +57,17 @@ def half_turn(points: FloatArray) -> FloatArray:
     R = se3.euler(z=HALF)
     axes = [middle + np.array([x, y, 0.0]) for x, y in product(AXES, AXES)]
     motions = np.stack([se3.make(R, axis - R @ axis) for axis in axes])
-    best = motions[np.argsort(-_onto(few, points, motions), kind="stable")[:REFINED]]
+    best = motions[np.argsort(-onto(few, points, motions, near), kind="stable")[:REFINED]]
     if len(points) >= 5:
         refine = Refiner(points)
         best = np.stack([*best, *(upright(refine(few, T), middle) for T in best)])
-    chosen: FloatArray = best[np.argmax(_onto(few, points, best))]
+    chosen: FloatArray = best[np.argmax(onto(few, points, best, near))]
     return chosen
 
 
-def _onto(few: FloatArray, points: FloatArray, motions: FloatArray) -> FloatArray:
-    """(H,) share of `few` points that motions (H, 4, 4) carry near to `points`."""
+def onto(few: FloatArray, points: FloatArray, motions: FloatArray, near: float) -> FloatArray:
+    """(H,) share of `few` points that motions (H, 4, 4) carry nearer than `near` (metres) to `points`."""
     moved = se3.apply(motions, few)
     distance = nearest(moved.reshape(-1, 3), points)[0].reshape(len(motions), -1)
-    share: FloatArray = (distance < NEAR).mean(axis=1)
+    share: FloatArray = (distance < near).mean(axis=1)
     return share

@@ -24,13 +24,12 @@ EXPLAINED = 0.2
 LIKE = 0.1
 
 
-class Things:
-    """Points of an observed scene, to be searched.
+class Standing:
+    """Points of an observed scene that a region may be.
 
     Attributes:
         query: the observed scene.
-        cloud: at least 5 points of it, all that the region may be; with normals, if need be of these alone.
-        surface: the same as evidence.
+        cloud: at least 5 points of it; with normals, if need be of these alone.
         refine: lays regions onto them.
     """
 
@@ -39,7 +38,6 @@ class Things:
         if cloud.normals is None:
             cloud = facing(cloud, self.refine.normals, viewpoints(query.observation))
         self.cloud = cloud
-        self.surface = Surface(cloud, tuple(query.observation.views.values()))
 
     @cached_property
     def labels(self) -> NDArray[np.int64]:
@@ -51,6 +49,18 @@ class Things:
         points, labels = self.cloud.points, self.labels
         large = np.flatnonzero(np.bincount(labels) >= fewest)
         return np.array([middle(points[labels == label]) for label in large]).reshape(-1, 3)
+
+
+class Things(Standing):
+    """The same, to be searched.
+
+    Attributes:
+        surface: the points as evidence.
+    """
+
+    def __init__(self, query: Scene, cloud: PointCloud) -> None:
+        super().__init__(query, cloud)
+        self.surface = Surface(self.cloud, tuple(query.observation.views.values()))
 
     def colored_like(self, cloud: PointCloud) -> BoolArray:
         """(N,) which points have a colour that occurs in a cloud."""

@@ -52,13 +52,11 @@ class Cases:
         inputs: (N, INPUTS) of the verification network.
         right: (N,) whether the candidate is right.
         case: (N,) the number of the case and stage that it belongs to, not decreasing.
-        last: (N,) whether that is the last stage of the search.
     """
 
     inputs: Float32Array
     right: BoolArray
     case: NDArray[np.int64]
-    last: BoolArray
 
 
 def make_cases(
@@ -142,24 +140,23 @@ def right_goals(goals: FloatArray, right: FloatArray) -> BoolArray:
 
 def write_cases(cases: Sequence[Sequence[tuple[Float32Array, BoolArray]]], path: Path) -> None:
     """One file, whole or not at all."""
-    stages = [(inputs, right, k + 1 == len(case)) for case in cases for k, (inputs, right) in enumerate(case)]
-    sizes = [len(right) for _, right, _ in stages]
+    stages = [stage for case in cases for stage in case]
+    sizes = [len(right) for _, right in stages]
     with replaced(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(
             file,
-            inputs=np.concatenate([inputs for inputs, _, _ in stages]),
-            right=np.concatenate([right for _, right, _ in stages]),
+            inputs=np.concatenate([inputs for inputs, _ in stages]),
+            right=np.concatenate([right for _, right in stages]),
             case=np.repeat(np.arange(len(stages)), sizes),
-            last=np.repeat([last for _, _, last in stages], sizes),
         )
 
 
-def read_cases(folder: Path) -> Cases:
-    """All cases of a folder."""
+def read_cases(*folders: Path) -> Cases:
+    """All cases of some folders."""
     parts, start = [], 0
-    for path in sorted(folder.glob("*.npz")):
+    for path in (path for folder in folders for path in sorted(folder.glob("*.npz"))):
         with np.load(path) as file:
-            parts.append((file["inputs"], file["right"], file["case"] + start, file["last"]))
+            parts.append((file["inputs"], file["right"], file["case"] + start))
             start += int(file["case"].max()) + 1
     return Cases(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 

@@ -92,8 +92,7 @@ def fit(network: VerificationNetwork, cases: Cases, config: VerificationTraining
     """Train the network in place; returns what it reaches on the cases that were kept apart."""
     rng = np.random.default_rng(config.seed)
     torch.manual_seed(config.seed)
-    files = cases.case
-    known = np.unique(files)
+    known = np.unique(cases.case)
     held = set(known[-max(1, round(config.held * len(known))) :].tolist())
     train, test = _Grouped(cases, set(known.tolist()) - held), _Grouped(cases, held)
     optimizer = torch.optim.AdamW(
@@ -137,17 +136,9 @@ def measure(network: VerificationNetwork, cases: _Grouped) -> dict[str, float]:
 def main() -> None:
     """Command line."""
     config = tyro.cli(VerificationTraining, description=__doc__)
-    parts = [read_cases(folder) for folder in config.cases]
-    starts = np.cumsum([0, *(int(part.case.max()) + 1 for part in parts[:-1])])
-    cases = Cases(
-        np.concatenate([part.inputs for part in parts]),
-        np.concatenate([part.right for part in parts]),
-        np.concatenate([part.case + start for part, start in zip(parts, starts, strict=True)]),
-        np.concatenate([part.last for part in parts]),
-    )
     model = load_model(config.weights)
     model.verification = VerificationNetwork(model.config.verification)
-    reached = fit(model.verification, cases, config)
+    reached = fit(model.verification, read_cases(*config.cases), config)
     print(", ".join(f"{name} {value:.3f}" for name, value in reached.items()))
     card = json.loads((config.weights / CARD).read_text())
     card["verification"] = {"command": shlex.join(sys.argv), **reached}
