@@ -20,6 +20,8 @@ from pathlib import Path
 import numpy as np
 import torch
 import tyro
+from imop.policy.matcher import Matcher, Transition
+from imop.policy.matcher import Scene as Seen
 from joblib import Parallel, delayed
 from rich.console import Console
 from rich.table import Table
@@ -33,8 +35,6 @@ from imop.geometry.neighbours import within
 from imop.geometry.perception import Perception
 from imop.networks.model import BUNDLED, load_model
 from imop.policy.learned import LearnedMatcher
-from imop.policy.matcher import Matcher, Transition
-from imop.policy.matcher import Scene as Seen
 from imop.policy.registration import RegistrationMatcher
 from imop.robots.panda import panda_self_filter
 from imop.sim.depth_noise import DepthNoise
@@ -83,9 +83,10 @@ class Row:
 
 
 def make_matcher(method: str, weights: Path) -> Matcher:
-    if method == "learned":
-        return LearnedMatcher(load_model(weights))
-    return TextbookMatcher() if method == "textbook" else RegistrationMatcher()
+    if method == "textbook":
+        return TextbookMatcher()
+    model = load_model(weights)
+    return LearnedMatcher(model) if method == "learned" else RegistrationMatcher(model.verification)
 
 
 def observe(scene: Scene, rng: np.random.Generator) -> tuple[Take, list[Observation]]:
@@ -120,12 +121,12 @@ def predict(
     pairs,
 ) -> Iterator[Row]:
     prepared = matcher.prepare(steps)
-    hints: list[FloatArray] = []
+    progress = BEGINNING
     for k, pair in pairs:
         started = time.perf_counter()
-        found = prepared[k].match(queries[k], hints)
+        found = prepared[k].locate(queries[k], progress)
         seconds = time.perf_counter() - started
-        hints = [found[0].T_query_support] if found else []
+        progress = Progress(found[0].T_query_support) if found else BEGINNING
         T = found[0].T_query_support if found else np.eye(4)
         goal = pair.T_world_goal
         position, rotation = errors(T @ goal, pair.T_query_support @ goal)
@@ -137,7 +138,7 @@ def predict(
             position,
             float(np.degrees(rotation)),
             iou(prepared[k].region, truth),
-            found[0].score if found else 0,
+            found[0].probability if found else 0,
             seconds,
         )
 

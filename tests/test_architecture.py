@@ -1,4 +1,4 @@
-"""Arrows point one way: types <- geometry <- demos <- networks <- policy <- candidates <- the rest."""
+"""Arrows point one way: types <- geometry <- demos <- networks <- policy <- the rest."""
 
 import ast
 from pathlib import Path
@@ -20,15 +20,13 @@ ALLOWED = {
     "robots": BASE | {"geometry"},
     "sim": BASE | {"geometry", "robots"},
     "tasks": BASE | {"geometry", "robots", "sim", "plugins"},
-    "candidates": BASE | {"geometry", "networks", "policy"},
-    "training": BASE | {"geometry", "demos", "networks", "policy", "candidates", "robots", "sim"},
+    "training": BASE | {"geometry", "demos", "networks", "policy", "robots", "sim"},
     "evaluation": BASE
     | {
         "geometry",
         "demos",
         "networks",
         "policy",
-        "candidates",
         "training",
         "robots",
         "sim",
@@ -61,7 +59,7 @@ def test_nobody_imports_the_command_line():
     assert not [p for p in SOURCE.rglob("*.py") if "cli" in set(imports(p))]
 
 
-@pytest.mark.parametrize("package", ["policy", "candidates", "networks"])
+@pytest.mark.parametrize("package", ["policy", "networks"])
 def test_policies_name_no_task_and_no_privileged_field(package):
     words = ("open_drawer", "stack_cubes", "lid_off_pot", "rubbish_in_bin", "instance_ids", "instance_names")
     words += ("object_name", "T_world_object", "joint_velocities", ".task", ".ids")

@@ -174,9 +174,8 @@ def evaluate(
         split: base, novel, cross_object or all.
         tasks: names within the split; all if none is given.
         methods: any of replay, textbook (FPFH, RANSAC and ICP of Open3D, extra baselines), registration,
-            learned, routed (learned, and the routing network may go back to a step), verified (candidates of
-            every generator and one learned verification), oracle (true object poses), expert, or one's own
-            (my_methods:MyPolicy), joined by commas.
+            learned, routed (learned, and the routing network may go back to a step), oracle (true object
+            poses), expert, or one's own (my_methods:MyPolicy), joined by commas.
         episodes: scenes per task, spread over its variations.
         seed: first seed of the scenes.
         instance: seed of the demonstrated objects' shapes, sizes and colours.

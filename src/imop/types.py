@@ -200,20 +200,31 @@ class Match:
         p_support: (N, 3) points of the demonstrated scene, world frame of the demonstration.
         p_query: (N, 3) their counterparts in the observed scene, world frame.
         region: (M, 3) the whole invariant region in the demonstrated scene.
+        T_query_support: (4, 4) the motion that carried the demonstrated pose over, world frame to world
+            frame; None if none did.
+        generator: who proposed the motion (`policy/proposals.py`); empty if nobody competed.
+        probability: 0 .. 1, of the motion being right.
     """
 
     step: int
     p_support: FloatArray
     p_query: FloatArray
     region: FloatArray
+    T_query_support: FloatArray | None = None
+    generator: str = ""
+    probability: float = 1.0
 
     def __post_init__(self) -> None:
+        if not 0.0 <= self.probability <= 1.0:
+            raise InvalidInput("probability", f"{self.probability}", "a number between 0 and 1")
         _set(
             self,
             p_support=as_array("p_support", self.p_support, (None, 3)),
             p_query=as_array("p_query", self.p_query, (len(self.p_support), 3)),
             region=as_array("region", self.region, (None, 3)),
         )
+        if self.T_query_support is not None:
+            _set(self, T_query_support=as_pose("T_query_support", self.T_query_support))
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,6 +237,7 @@ class Action:
         allow_collisions: whether the motion may touch things.
         confidence: 0 .. 1.
         match: the evidence, or None for actions that were not predicted by matching.
+        reachable: whether the arm can take the gripper there; None if that was not asked.
     """
 
     T_world_gripper: FloatArray
@@ -233,6 +245,7 @@ class Action:
     allow_collisions: bool = False
     confidence: float = 1.0
     match: Match | None = None
+    reachable: bool | None = None
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.confidence <= 1.0:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from imop.policy.interfaces import Candidate
 
 from imop.evaluation.appearance import Appearance
 from imop.evaluation.open_loop import Case, ToldRouter, ask, region_iou
@@ -15,7 +16,6 @@ from imop.geometry import cloud as clouds
 from imop.geometry import se3
 from imop.geometry.accuracy import COARSE, FINE
 from imop.geometry.perception import Perception
-from imop.policy.matcher import Hypothesis
 from imop.policy.one_shot import OneShotPolicy
 from imop.tasks.env import make_task
 from imop.tasks.expert import record_demonstration
@@ -92,9 +92,9 @@ class Everywhere:
         def __init__(self, region, finds):
             self.region, self._finds = region, finds
 
-        def match(self, query, hints=()):
+        def locate(self, query, progress=None, feasible=None):
             points = np.zeros((3, 3))
-            return (Hypothesis(np.eye(4), 1.0, points, points),) if self._finds else ()
+            return (Candidate(np.eye(4), 1.0, points, points),) if self._finds else ()
 
 
 class AlwaysFirst:

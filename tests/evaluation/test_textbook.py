@@ -31,7 +31,7 @@ def prepared():
 
 def test_a_thing_without_symmetry_is_found(prepared):
     T = at(0.25, -0.15, yaw=0.8)
-    (found,) = prepared.match(scene(angle(0.16, 0.05, 0.05, T), HOME))
+    (found,) = prepared.locate(scene(angle(0.16, 0.05, 0.05, T), HOME))
     truth = T @ se3.invert(at(0.1, 0.1))
     assert se3.translation_distance(found.T_query_support @ GRASP, truth @ GRASP) < 0.01
     assert found.score > 0.9 and len(found.p_support) == len(found.p_query)
@@ -39,13 +39,13 @@ def test_a_thing_without_symmetry_is_found(prepared):
 
 def test_the_same_query_gives_the_same_answer(prepared):
     query = scene(angle(0.16, 0.05, 0.05, at(0.2, -0.1, yaw=-0.5)), HOME)
-    first, second = (prepared.match(query)[0].T_query_support for _ in range(2))
+    first, second = (prepared.locate(query)[0].T_query_support for _ in range(2))
     np.testing.assert_allclose(first, second, atol=1e-6)
 
 
-def test_a_query_without_points_gives_no_hypothesis(prepared):
+def test_a_query_without_points_gives_no_candidate(prepared):
     query = scene([], HOME)
-    assert prepared.match(type(query)(query.observation, query.cloud.select(np.arange(0)))) == ()
+    assert prepared.locate(type(query)(query.observation, query.cloud.select(np.arange(0)))) == ()
 
 
 def test_without_open3d_the_extra_is_named(monkeypatch):

@@ -4,7 +4,7 @@ import numpy as np
 
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, concatenate
-from imop.policy.matcher import Scene, Transition
+from imop.policy.interfaces import Scene, Transition
 from imop.types import Action, CameraView, Observation
 
 DOWN = np.diag([1.0, -1.0, -1.0])

@@ -5,6 +5,7 @@ import pytest
 
 from imop.geometry import se3
 from imop.networks.model import load_model
+from imop.policy.interfaces import Progress
 from imop.policy.learned import LearnedMatcher
 from tests.policy.scenes import BLUE, GREEN, RED, TABLE, above, at, box, moved, scene, transitions
 
@@ -41,7 +42,7 @@ def test_the_region_moves_with_the_scene(matcher):
 
 def test_an_unchanged_scene_is_recognised(matcher):
     step = matcher.prepare(steps())[0]
-    best = step.match(steps()[0].before)[0]
+    best = step.locate(steps()[0].before)[0]
     assert se3.translation_distance(best.T_query_support @ GRASP, GRASP) < 0.005
     assert se3.rotation_distance(best.T_query_support, np.eye(4)) < 0.05
 
@@ -49,13 +50,13 @@ def test_an_unchanged_scene_is_recognised(matcher):
 def test_a_hint_is_tried(matcher):
     T = at(0.3, -0.2, yaw=1.2) @ se3.invert(at(0.1, 0.1))
     query = scene([moved(box(SIZE, RED, at(0.1, 0.1)), T)], HOME)
-    best = matcher.prepare(steps())[0].match(query, [T])
-    assert max(h.score for h in best) > 0.5
+    best = matcher.prepare(steps())[0].locate(query, Progress(T))
+    assert max(h.probability for h in best) > 0.5
 
 
 def test_the_same_question_has_the_same_answer(matcher):
     query = scene([box(SIZE, RED, at(0.3, -0.2)), box(SIZE, BLUE, at(0.0, 0.2))], HOME)
-    first, second = (matcher.prepare(steps())[0].match(query) for _ in range(2))
+    first, second = (matcher.prepare(steps())[0].locate(query) for _ in range(2))
     assert np.array_equal(first[0].T_query_support, second[0].T_query_support)
 
 
@@ -79,14 +80,14 @@ def test_what_bent_is_found_by_the_end_that_is_grasped(matcher, side):
     links, grasp = chain(side)
     step = matcher.prepare(transitions([scene(links, HOME), scene(links, grasp, 0.5)], [(grasp, False)]))[0]
     links, wanted = chain(-side)
-    best = step.match(scene(links, HOME))[0]
+    best = step.locate(scene(links, HOME))[0]
     assert se3.translation_distance(best.T_query_support @ grasp, wanted) < 0.02
 
 
-def test_a_query_without_points_gives_no_hypothesis(matcher):
+def test_a_query_without_points_gives_no_candidate(matcher):
     query = scene([], HOME)
     empty = type(query)(query.observation, query.cloud.select(np.arange(0)))
-    assert matcher.prepare(steps())[0].match(empty) == ()
+    assert matcher.prepare(steps())[0].locate(empty) == ()
 
 
 def test_what_is_taken_is_found_where_it_moved_on_what_carries_it(matcher):
@@ -106,7 +107,7 @@ def test_what_is_taken_is_found_where_it_moved_on_what_carries_it(matcher):
     T = at(0.05, -0.1, 0.0, yaw=0.3)
     T_slid = at(0.15, 0.13, top, yaw=0.4) @ se3.invert(at(0.05, 0.05, top))
     query = scene(chest_with(moved(note, T_slid), T), HOME)
-    best = step.match(query)[0].T_query_support
+    best = step.locate(query)[0].T_query_support
     assert se3.translation_distance(best @ grasp, T @ T_slid @ grasp) < 0.015
 
 
@@ -118,10 +119,10 @@ def test_what_has_a_new_colour_is_found_by_its_shape_and_not_in_that_of_another(
     step = matcher.prepare(transitions([scene(shown, HOME), scene(shown, GRASP, 0.5)], [(GRASP, False)]))[0]
     for x, y in ((0.3, 0.2), (0.0, 0.2)):
         asked = [box(SIZE, new, at(x, y)), box(SIZE, other, at(0.2, -0.1))]
-        best = step.match(scene(asked, HOME))[0]
+        best = step.locate(scene(asked, HOME))[0]
         assert se3.translation_distance(best.T_query_support @ GRASP, above(x, y, TABLE + 0.05)) < 0.02
         same = [box(SIZE, color, at(x, y)), asked[1]]
-        assert best.score < step.match(scene(same, HOME))[0].score
+        assert best.probability < step.locate(scene(same, HOME))[0].probability
 
 
 def test_what_is_in_the_hand_is_known_in_any_colour(matcher):
@@ -137,5 +138,5 @@ def test_what_is_in_the_hand_is_known_in_any_colour(matcher):
     shown = [scene([cube], HOME), held(RED, GRASP), held(RED, lift), held(RED, high)]
     steps = transitions(shown, [(GRASP, False), (lift, False), (high, False)])
     T = at(0.2, -0.1, 0.0, yaw=0.7)
-    best = matcher.prepare(steps)[2].match(held(BLUE, T @ lift))[0]
-    assert se3.translation_distance(best.T_query_support, T) < 0.005 and best.score > 0.5
+    best = matcher.prepare(steps)[2].locate(held(BLUE, T @ lift))[0]
+    assert se3.translation_distance(best.T_query_support, T) < 0.005 and best.probability > 0.5

@@ -1,5 +1,6 @@
 """What becomes of the region network's answer. The network is played: what counts is what is made of it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +10,7 @@ import torch
 from imop.geometry import se3
 from imop.networks.graph import GraphConfig
 from imop.networks.region import RegionPrediction
-from imop.policy.learned_region import find_shown_regions
+from imop.policy.learned import find_shown_regions
 from tests.policy.scenes import BLUE, GREY, RED, TABLE, above, at, box, moved, scene, transitions
 
 SPREAD = 0.007
@@ -46,10 +47,10 @@ def everything(points):
 def test_what_is_taken_is_told_from_the_rest_of_the_region():
     steps, note = taking()
     shown = find_shown_regions(model(everything), steps, 0.5)
-    taken = shown[0].taken
-    assert taken is not None and len(taken.cloud) < 0.5 * len(shown[0].region.cloud)
-    np.testing.assert_allclose(taken.cloud.points.mean(axis=0), note.points.mean(axis=0), atol=0.01)
-    assert shown[1].taken is None and shown[1].holding and not shown[0].holding
+    payload = shown[0].payload
+    assert payload is not None and len(payload) < 0.5 * len(shown[0].region.cloud)
+    np.testing.assert_allclose(payload.points.mean(axis=0), note.points.mean(axis=0), atol=0.01)
+    assert shown[1].payload is None
     for step in shown:
         np.testing.assert_allclose(step.region.spread, np.full(len(step.region.cloud), SPREAD))
 
@@ -61,7 +62,7 @@ def test_a_region_that_is_what_is_taken_needs_no_telling():
     def on_note(points):
         return np.all((points > lower) & (points < upper), axis=1) & (points[:, 2] > TOP + 0.01)
 
-    assert find_shown_regions(model(on_note), steps, 0.5)[0].taken is None
+    assert find_shown_regions(model(on_note), steps, 0.5)[0].payload is None
 
 
 @pytest.mark.parametrize("place", [(0.25, 0.1), (0.1, -0.1)])
@@ -117,3 +118,13 @@ def test_a_scrap_elsewhere_gives_way_to_what_the_gripper_goes_to(size):
 
     region = find_shown_regions(model(on_scrap), steps, 0.5)[0].region.cloud.points
     assert (region[:, 1].min() > 0.0) == (size < 0.05)
+
+
+def test_what_is_out_of_focus_is_not_in_the_region():
+    steps, _ = taking()
+    cloud = steps[0].before.fused
+    upper = cloud.points[:, 2] > TOP - 0.002
+    before = replace(steps[0].before, focus=upper)
+    shown = find_shown_regions(model(everything), [replace(steps[0], before=before), *steps[1:]], 0.5)
+    assert shown[0].region.cloud.points[:, 2].min() > TOP - 0.02
+    assert shown[1].region.cloud.points[:, 2].min() < TOP - 0.05

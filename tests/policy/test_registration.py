@@ -5,6 +5,8 @@ import numpy as np
 from imop.demos.rlbench import read_episode
 from imop.evaluation.predict import predict
 from imop.geometry import se3
+from imop.networks.model import load_model
+from imop.policy.interfaces import Progress
 from imop.policy.one_shot import OneShotPolicy
 from imop.policy.registration import RegistrationMatcher
 from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, moved, scene, transitions
@@ -16,13 +18,13 @@ SIZE = (0.1, 0.05, 0.06)
 
 def prepared():
     scenes = [scene([box(SIZE, RED, at(0.1, 0.1))], T) for T in (HOME, GRASP)]
-    return RegistrationMatcher().prepare(transitions(scenes, [(GRASP, False)]))[0]
+    return RegistrationMatcher(load_model().verification).prepare(transitions(scenes, [(GRASP, False)]))[0]
 
 
 def test_the_box_of_the_same_colour_is_found():
     T = at(0.3, -0.2, yaw=1.2)
     query = scene([box(SIZE, RED, T, seed=1), box(SIZE, BLUE, at(0.1, 0.1), seed=2)], HOME)
-    best = prepared().match(query)[0]
+    best = prepared().locate(query)[0]
     truth = T @ se3.invert(at(0.1, 0.1))
     half_turn = truth @ at(0.1, 0.1) @ se3.make(se3.euler(z=np.pi)) @ se3.invert(at(0.1, 0.1))
     errors = [
@@ -33,18 +35,18 @@ def test_the_box_of_the_same_colour_is_found():
     assert min(errors) < 0.05
 
 
-def test_two_equal_boxes_are_two_hypotheses():
+def test_two_equal_boxes_are_two_candidates():
     boxes = [box(SIZE, RED, at(x, y), seed=1) for x, y in ((0.3, -0.2), (0.0, 0.2))]
-    found = prepared().match(scene(boxes, HOME))
-    places = np.array([(h.T_query_support @ GRASP)[:2, 3] for h in found if h.score > 0.8])
+    found = prepared().locate(scene(boxes, HOME))
+    places = np.array([(h.T_query_support @ GRASP)[:2, 3] for h in found if h.probability > 0.8])
     for place in ((0.3, -0.2), (0.0, 0.2)):
         assert np.linalg.norm(places - place, axis=1).min() < 0.005
 
 
-def test_hypotheses_come_best_first_up_to_preference():
-    found = prepared().match(scene([box(SIZE, RED, at(0.3, -0.2), seed=1)], HOME))
-    assert found[0].score > 0.9 and all(0 <= h.score <= 1 for h in found)
-    assert found[0].score >= 0.9 * max(h.score for h in found)
+def test_candidates_come_likeliest_first():
+    found = prepared().locate(scene([box(SIZE, RED, at(0.3, -0.2), seed=1)], HOME))
+    p = [candidate.probability for candidate in found]
+    assert p[0] > 0.5 and p == sorted(p, reverse=True) and p[-1] >= 0
 
 
 def test_an_approached_thing_stays_the_aim():
@@ -53,19 +55,19 @@ def test_an_approached_thing_stays_the_aim():
         hint = at(x, y, 0.0) @ se3.invert(at(0.1, 0.1, 0.0))
         step = prepared()
         query = scene(boxes, hint @ HOME)
-        best = step.match(query, [hint])[0]
+        best = step.locate(query, Progress(hint))[0]
         assert se3.translation_distance(best.T_query_support @ GRASP, hint @ GRASP) < 0.01
 
 
-def test_a_query_without_points_gives_no_hypothesis():
+def test_a_query_without_points_gives_no_candidate():
     query = scene([], HOME)
     empty = type(query)(query.observation, query.cloud.select(np.arange(0)))
-    assert prepared().match(empty) == ()
+    assert prepared().locate(empty) == ()
 
 
 def test_real_demonstrations(perception, rlbench_demos):
     episodes = rlbench_demos / "open_drawer" / "all_variations" / "episodes"
-    policy = OneShotPolicy(RegistrationMatcher(), perception)
+    policy = OneShotPolicy(RegistrationMatcher(load_model().verification), perception)
     policy.watch(read_episode(episodes / "episode5").stripped())
     predictions = predict(policy, read_episode(episodes / "episode3"))
     assert [p.within_1cm_5deg for p in predictions] == [True, True, True]
@@ -75,6 +77,6 @@ def test_moving_the_whole_scene_moves_the_answer(rng):
     T = at(0.05, -0.08, 0.0, yaw=0.4)
     thing = box(SIZE, RED, at(0.25, -0.1), seed=1)
     actions = [
-        prepared().match(scene([moved(thing, M)], HOME))[0].T_query_support @ GRASP for M in (np.eye(4), T)
+        prepared().locate(scene([moved(thing, M)], HOME))[0].T_query_support @ GRASP for M in (np.eye(4), T)
     ]
     assert se3.translation_distance(T @ actions[0], actions[1]) < 0.005

@@ -1,26 +1,133 @@
-"""Motions that are made of others: upright ones to a place, and one that is carried on to another place."""
+"""One search in one scene, on boxes: what is proposed, laid down, told apart, and when it ends."""
 
 import numpy as np
+import torch
 
 from imop.geometry import se3
-from imop.policy.search import straightened, upright_motions
-from tests.policy.scenes import TABLE, at
+from imop.networks.verification import EVIDENCE, INPUTS
+from imop.policy.interfaces import BEGINNING, PolicyConfig, Progress, Scene
+from imop.policy.proposals import Asked, Matches
+from imop.policy.region import Region
+from imop.policy.search import StepSearch
+from imop.policy.verification import Verifier
+from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, scene, transitions
 
-CENTER = np.array([0.1, 0.1, TABLE])
-T = at(0.3, -0.2, yaw=1.2) @ se3.invert(at(0.1, 0.1))
-TURNS = 24
+HOME = above(0.0, -0.3, 1.2)
+GRASP = above(0.1, 0.1, TABLE + 0.05)
+SIZE = (0.1, 0.05, 0.06)
+HERE, THERE = at(0.1, 0.1), at(0.3, -0.2, yaw=1.2)
+T = THERE @ se3.invert(HERE)
+CLOUD = box(SIZE, RED, HERE)
+NOTHING = Matches(*(np.zeros((0, 3)) for _ in range(4)), np.zeros(0))
 
 
-def test_upright_motions_take_the_centre_to_every_place():
-    places = np.array([[0.3, 0.1, 0.8], [0.0, -0.2, 0.9]])
-    motions = upright_motions(CENTER, places, TURNS)
-    moved = se3.apply(motions, CENTER[None])[:, 0]
-    np.testing.assert_allclose(moved, np.repeat(places, TURNS, axis=0), atol=1e-12)
-    np.testing.assert_allclose(motions[:, 2, 2], 1.0)
+class Exact(torch.nn.Module):
+    """What is explained exactly and in its colours is right."""
+
+    def probability(self, inputs):
+        column = {name: inputs[:, k] for k, name in enumerate(EVIDENCE)}
+        assert inputs.shape[1] == INPUTS
+        return (column["region_exact"] * column["region_color"] * column["backward_exact"]).clamp(0, 1)
 
 
-def test_straightened_goes_to_the_same_place_in_the_other_turn():
-    straight = at(0.5, 0.5, 0.1, yaw=0.3)
-    moved = straightened(T, straight, CENTER)
-    np.testing.assert_allclose(se3.apply(moved, CENTER[None]), se3.apply(T, CENTER[None]))
-    np.testing.assert_allclose(moved[:3, :3], straight[:3, :3])
+def search(fits=None, matches=NOTHING, asked=None, **settings):
+    region = Region(CLOUD, np.ones(len(CLOUD)), np.zeros((0, 3)), spread=np.full(len(CLOUD), 0.001))
+    step = transitions([scene([CLOUD], HOME), scene([CLOUD], GRASP)], [(GRASP, False)])[0]
+
+    def ask(query):
+        if asked is not None:
+            asked.append(query)
+        return Asked(fits or {}, matches)
+
+    return StepSearch(PolicyConfig(**settings), step, region, None, Verifier(Exact()), ask)
+
+
+def query(*poses, T_world_gripper=HOME):
+    return scene([box(SIZE, RED, pose, seed=1 + k) for k, pose in enumerate(poses)], T_world_gripper)
+
+
+def off(candidate, pose=THERE):
+    """Metres, and radians but for a half turn: the box has two."""
+    angle = float(se3.rotation_distance(candidate.T_query_support @ HERE, pose))
+    return se3.translation_distance(candidate.T_query_support @ HERE, pose), min(angle, np.pi - angle)
+
+
+def test_a_fit_that_is_nearly_right_is_laid_down_exactly():
+    found = search({"fit": at(0.008, -0.006, 0.0) @ T}).locate(query(THERE))
+    distance, angle = off(found[0])
+    assert distance < 0.003 and angle < 0.05 and found[0].probability > 0.8
+    assert (
+        np.linalg.norm(
+            se3.apply(found[0].T_query_support, found[0].p_support) - found[0].p_query, axis=1
+        ).max()
+        < 0.02
+    )
+
+
+def test_what_no_match_leads_to_is_found_anywhere():
+    found = search().locate(query(THERE))
+    assert off(found[0])[0] < 0.005 and found[0].generator in ("anywhere", "half_turn", "exact", "upright")
+
+
+def test_a_hint_that_holds_needs_no_matcher():
+    asked = []
+    found = search(asked=asked, enough=0.7).locate(query(THERE), Progress(at(0.003, 0.0, 0.0) @ T))
+    assert asked == [] and off(found[0])[0] < 0.003
+
+
+def test_what_is_gone_is_looked_for_elsewhere():
+    asked = []
+    found = search({"fit": T}, asked=asked).locate(query(THERE), Progress(at(0.0, 0.3, 0.0)))
+    assert len(asked) == 1 and off(found[0])[0] < 0.003
+
+
+def test_two_equal_things_are_two_candidates():
+    other = at(0.0, 0.2)
+    found = search().locate(query(THERE, other))
+    for pose in (THERE, other):
+        assert min(off(c, pose)[0] for c in found if c.probability > 0.7) < 0.01
+
+
+def test_of_several_things_the_one_of_the_same_colour_is_likelier():
+    boxes = [box(SIZE, RED, THERE, seed=1), box(SIZE, BLUE, at(0.0, 0.2), seed=2)]
+    found = search().locate(scene(boxes, HOME))
+    assert off(found[0])[0] < 0.005
+
+
+def test_no_candidate_is_listed_twice_and_the_likeliest_is_first():
+    found = search({"fit": T, "firm": T}).locate(query(THERE))
+    p = [c.probability for c in found]
+    assert p == sorted(p, reverse=True)
+    goals = np.stack([c.T_query_support for c in found])
+    near = se3.near(goals[:, None], goals[None], 1e-4, 1e-3)
+    assert near.sum() == len(found)
+
+
+def test_every_pool_holds_the_ones_before_it():
+    sizes = [len(pool.motions) for pool in search({"fit": T}).pools(query(THERE), BEGINNING)]
+    assert sizes == sorted(sizes) or len(sizes) == 3
+    pool = list(search({"fit": T}).pools(query(THERE), BEGINNING))[-1]
+    assert pool.evidence().shape == (len(pool.motions), len(EVIDENCE)) and np.isfinite(pool.evidence()).all()
+    assert len(pool.generators) == len(pool.motions)
+
+
+def test_an_empty_scene_has_no_candidates():
+    empty = query()
+    bare = type(empty)(empty.observation, empty.fused.select(np.arange(0)))
+    assert search().locate(bare) == () and search().locate(empty) == ()
+
+
+def test_what_is_out_of_focus_is_no_candidate():
+    other = at(0.0, 0.2)
+    both = query(THERE, other)
+    for pose in (THERE, other):
+        focus = np.linalg.norm(both.fused.points[:, :2] - pose[:2, 3], axis=1) < 0.1
+        found = search({"fit": T}).locate(Scene(both.observation, both.fused, focus))
+        assert off(found[0], pose)[0] < 0.005
+        assert all(off(candidate, pose)[0] < 0.1 for candidate in found)
+
+
+def test_if_nothing_is_in_focus_there_is_no_candidate():
+    both = query(THERE)
+    nothing = Scene(both.observation, both.fused, np.zeros(len(both.fused), dtype=bool))
+    assert search({"fit": T}).locate(nothing) == ()

@@ -123,7 +123,8 @@ def attempt(
     except ImopError as error:
         # What a policy cannot handle it has failed at; the other methods and scenes go on.
         return Episode(trial, method, state, False, str(error))
-    return Episode(trial, method, state, result.success, result.reason, len(result.steps))
+    decisions = tuple((step.generator, step.confidence) for step in result.steps)
+    return Episode(trial, method, state, result.success, result.reason, len(result.steps), decisions)
 
 
 def _count(episodes: list[Episode | None]) -> Count:

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import dacite
 
-import imop.candidates
 import imop.demos
 import imop.evaluation.textbook
 import imop.geometry
@@ -35,6 +34,7 @@ class Episode:
         success: whether the task was done; None if the objects of the scene found no place.
         reason: why the episode ended.
         actions: how many were taken.
+        decisions: who proposed each action, and with which probability of being right.
     """
 
     trial: Trial
@@ -43,6 +43,7 @@ class Episode:
     success: bool | None
     reason: str
     actions: int = 0
+    decisions: tuple[tuple[str, float], ...] = ()
 
 
 class EpisodeLog:
@@ -76,9 +77,9 @@ def method_state(method: str, weights: Path | None, task: str) -> str:
     """Digest of the code that decides how a method does in a task, and of its weights if it has some."""
     digests = [code_digest(imop.sim, imop.robots, imop.tasks, imop.geometry)]
     if method not in ("expert", "oracle", "replay"):
-        deciding = imop.policy, imop.candidates, imop.networks, imop.demos, imop.evaluation.textbook
+        deciding = imop.policy, imop.networks, imop.demos, imop.evaluation.textbook
         digests.append(code_digest(*deciding))
-    if method in ("learned", "verified", "routed"):
+    if method in ("learned", "registration", "routed"):
         digests.append(weights_digest(weights or BUNDLED))
     own = [find_task(task)] + ([] if method in METHODS else [find_method(method)])
     return "-".join([*digests, *own_code_digest(*own)])
@@ -96,7 +97,7 @@ def read_episodes(path: Path) -> Iterator[Episode]:
             fields = json.loads(line)
             if not isinstance(fields, dict):
                 raise TypeError("not an object")
-            yield dacite.from_dict(Episode, fields, dacite.Config(strict=True))
+            yield dacite.from_dict(Episode, fields, dacite.Config(cast=[tuple], strict=True))
         except (ValueError, TypeError, dacite.DaciteError) as error:
             problem = f"line {number} is no episode ({error})"
             raise CorruptData(path, problem, "lines as `imop eval` writes them") from error

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Protocol, cast
 
 from imop import plugins
-from imop.candidates.matchers import VerifiedMatcher
 from imop.errors import InvalidInput
 from imop.evaluation.oracle import OraclePolicy, Poses
 from imop.evaluation.replay import ReplayPolicy
@@ -14,12 +13,12 @@ from imop.evaluation.robots import PANDA, robot_functions
 from imop.evaluation.textbook import TextbookMatcher
 from imop.geometry.perception import Perception
 from imop.networks.model import BUNDLED, load_model
-from imop.policy.matcher import Matcher
+from imop.policy.interfaces import Matcher
 from imop.policy.one_shot import OneShotPolicy
 from imop.policy.registration import RegistrationMatcher
 from imop.types import Action, Demonstration, Observation
 
-METHODS = ("replay", "textbook", "registration", "learned", "verified", "routed", "oracle", "expert")
+METHODS = ("replay", "textbook", "registration", "learned", "routed", "oracle", "expert")
 _OWN = (
     "a class or function that makes, called without arguments, an object with watch, reset and act, named "
     "module:object or by an entry point imop.methods"
@@ -49,13 +48,13 @@ def make_policy(
     """A fresh policy by the name of its method.
 
     Args:
-        method: learned, routed (learned, and the routing network chooses the step), verified (candidates of
-            every generator and one learned verification), replay, registration, textbook, oracle, or one's
-            own: "module:object", or an entry point of the group imop.methods. The
+        method: learned, routed (learned, and the routing network chooses the step), replay, registration,
+            textbook, oracle, or one's own: "module:object", or an entry point of the group imop.methods. The
             object makes a `Policy` when it is called without arguments.
         world: the simulated world, which only the oracle reads.
         min_confidence: of the one-shot policies.
-        weights: folder of the learned policy's weights; by default the bundled ones.
+        weights: folder of the networks' weights; by default the bundled ones. Registration asks the
+            verification network alone.
         robot: name of the robot, see `robot_functions`; one's own method deals with it itself.
 
     Raises:
@@ -67,11 +66,10 @@ def make_policy(
     is_robot, reachable = robot_functions(robot)
     perception = Perception(is_robot)
     if method in ("registration", "textbook"):
-        matcher: Matcher = RegistrationMatcher() if method == "registration" else TextbookMatcher()
+        matcher: Matcher = TextbookMatcher()
+        if method == "registration":
+            matcher = RegistrationMatcher(load_model(weights or BUNDLED).verification)
         return OneShotPolicy(matcher, perception, min_confidence=min_confidence, feasible=reachable)
-    if method == "verified":
-        found = VerifiedMatcher(load_model(weights or BUNDLED))
-        return OneShotPolicy(found, perception, min_confidence=min_confidence, feasible=reachable)
     if method in ("learned", "routed"):
         return OneShotPolicy.from_pretrained(
             weights or BUNDLED, perception, min_confidence, method == "routed", reachable

@@ -21,7 +21,7 @@ from imop.geometry import se3
 from imop.geometry.accuracy import COARSE, errors
 from imop.geometry.neighbours import nearest, within
 from imop.geometry.perception import WORKSPACE_LOWER, WORKSPACE_UPPER
-from imop.policy.matcher import Scene, Transition
+from imop.policy.interfaces import Scene, Transition
 from imop.policy.one_shot import OneShotPolicy
 from imop.policy.router import Router
 from imop.types import Action, Demonstration, FloatArray, Keyframe, Observation

@@ -83,14 +83,24 @@ def perform(
 def steps_table(result: Rollout) -> Table:
     """The steps of an episode for the terminal."""
     table = Table()
-    for column in ("action", "support step", "off the expert", "confidence", "decided in", "moved in"):
+    columns = (
+        "action",
+        "support step",
+        "proposed by",
+        "probability",
+        "off the expert",
+        "decided in",
+        "moved in",
+    )
+    for column in columns:
         table.add_column(column, justify="right")
     for number, step in enumerate(result.steps):
         table.add_row(
             str(number),
             "-" if step.support_step is None else str(step.support_step),
+            step.generator or "-",
+            f"{step.confidence:.2f}" + ("" if step.reachable is not False else ", out of reach"),
             deviation(step.position_error, step.rotation_error),
-            f"{step.confidence:.2f}",
             f"{step.policy_seconds:.2f} s",
             step.plan_failed or f"{step.motion_seconds:.2f} s",
         )

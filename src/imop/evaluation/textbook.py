@@ -12,9 +12,9 @@ import numpy as np
 
 from imop.errors import MissingExtra
 from imop.geometry.cloud import PointCloud
-from imop.policy.matcher import Hypothesis, Scene, Transition
+from imop.policy.interfaces import BEGINNING, Candidate, Feasible, Progress, Scene, Transition
 from imop.policy.region import Region, find_regions
-from imop.policy.things import without_held
+from imop.policy.target import without_held
 from imop.types import FloatArray
 
 # Neighbours within `radius` that a descriptor looks at, at most.
@@ -80,13 +80,13 @@ class TextbookMatcher:
         )
         return np.array(result.transformation)
 
-    def refine(self, source: PointCloud, target: PointCloud, T: FloatArray) -> Hypothesis:
-        """The motion (4, 4) after closest points; the score is the share of points that found one."""
+    def refine(self, source: PointCloud, target: PointCloud, T: FloatArray) -> Candidate:
+        """The motion (4, 4) after closest points; its fitness stands for the probability."""
         found = _open3d().pipelines.registration
         plane = found.TransformationEstimationPointToPlane()
         result = found.registration_icp(_cloud(source), _cloud(target), self.closest, T, plane)
         i_support, i_query = np.asarray(result.correspondence_set).reshape(-1, 2).T
-        return Hypothesis(
+        return Candidate(
             np.array(result.transformation),
             float(result.fitness),
             source.points[i_support],
@@ -106,8 +106,10 @@ class TextbookStep:
         """(M, 3) points of the region in the demonstrated scene."""
         return self._region.cloud.points
 
-    def match(self, query: Scene, hints: Sequence[FloatArray] = ()) -> tuple[Hypothesis, ...]:
-        """Where the region is in the query: one answer; hints are not used. See `PreparedStep.match`."""
+    def locate(
+        self, query: Scene, progress: Progress = BEGINNING, feasible: Feasible | None = None
+    ) -> tuple[Candidate, ...]:
+        """Where the region is in the query: one answer, by what is seen alone. See `PreparedStep.locate`."""
         if len(query.cloud) < 5:
             return ()
         things = without_held(query.cloud.select(~query.ground.bare), query, self._region)

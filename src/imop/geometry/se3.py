@@ -98,3 +98,11 @@ def near(T_a: FloatArray, T_b: FloatArray, distance: float, angle: float) -> Boo
 def euler(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> FloatArray:
     """Rotation (3, 3) about the fixed x, then y, then z axis."""
     return np.asarray(Rotation.from_euler("xyz", (x, y, z)).as_matrix())
+
+
+def orthonormal(T: FloatArray) -> FloatArray:
+    """The pose (4, 4) with rounding errors of its rotation removed."""
+    U, _, Vh = np.linalg.svd(T[:3, :3])
+    clean = T.copy()
+    clean[:3, :3] = U @ Vh
+    return clean

@@ -18,18 +18,20 @@ EVIDENCE = (
     *(
         f"{weighting}_{name}"
         for weighting in WEIGHTINGS
-        for name in ("exact", "loose", "color", "hidden", "absent")
+        for name in ("exact", "loose", "color", "clash", "hidden", "absent")
     ),
     *(f"context_{name}" for name in ("loose", "color", "absent")),
-    *(f"backward_{name}" for name in ("exact", "color", "size")),
+    "pattern",
+    *(f"backward_{name}" for name in ("exact", "color", "clash", "size")),
     *(f"around_{name}" for name in ("forward", "backward")),
     *(f"matches_{name}" for name in ("asked", "sure", "tight", "loose", "near")),
     *("tilt", "rise", "begun", "hint_away", "hint_turn", "gripper_away", "gripper_turn"),
-    *("held", "opens", "opening", "size", "points", "certainty", "spread", "near_spread", "turns"),
+    *("held", "opens", "opening", "size", "points", "certainty", "spread", "near_spread", "turns", "marks"),
 )
 """What is known of a candidate on its own."""
-RIVALRY = ("region_exact", "near_loose", "firm_loose", "matches_loose", "color")
-"""What is compared with the best candidate of all, and with the best that acts somewhere else."""
+RIVALRY = ("region_exact", "near_loose", "firm_loose", "matches_loose", "pattern", "alike", "clear")
+"""What is compared with the best candidate of all, and with the best that acts somewhere else: numbers of the
+evidence, what is explained in its colour (`alike`), and what is not contradicted by colours (`clear`)."""
 INPUTS = len(EVIDENCE) + 2 * len(RIVALRY)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from imop.geometry import se3
 from imop.geometry.clusters import Objects, connected
 from imop.geometry.neighbours import nearest, within
-from imop.policy.matcher import Transition
+from imop.policy.interfaces import Transition
 from imop.types import BoolArray, FloatArray
 
 # Two observations of one surface are this near to each other, metres.

@@ -1,8 +1,12 @@
-"""How well a moved region explains an observed scene: points, normals, colours and free space."""
+"""What speaks for a motion of a region: how it explains what the cameras saw, point by point, in numbers.
+
+Forward, the observed points have to explain the moved region; backward, the region has to explain what was
+observed around it, which tells a thing from a larger one and a front with handles from a back. Nothing is
+decided here: `networks/verification.py` learns what the numbers are worth.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,44 +14,109 @@ from scipy.spatial import cKDTree
 
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, concatenate, farthest_points, project
-from imop.policy.matcher import Hypothesis
 from imop.policy.region import Region
 from imop.types import BoolArray, CameraView, Float32Array, FloatArray
 
+# Farthest counterpart, metres.
+REACH = 0.03
+# Standard deviations of what is explained exactly: off the counterpart's tangent plane and along it, metres.
+OFFSET, ALONG = 0.005, 0.008
+# Standard deviation of the difference of two shades of one colour; see `shades`.
+SHADE = 0.25
+# What a counterpart counts that faces the other way: thin walls are seen from either side.
+BEHIND = 0.9
+# A camera sees a face from this cosine of the angle to its normal on, and must see this far (metres) behind
+# a point to prove it absent.
+GRAZING, THROUGH = 0.25, 0.02
+# Observed points this near to the moved region, metres, have to be explained by it.
+AROUND = 0.04
+# What is farther than this (metres) from where the gripper goes has nothing to say about it.
+BESIDE = 0.08
+# Colours that agree less than this contradict each other. What their pattern explains is told from noise of
+# this variance.
+CLASH, NOISE = 0.1, 0.02
+# What is next to the gripper: scale of the weights, metres.
+NEXT = 0.05
+# Points that are compared: of the region, of its context, and of what was observed around it.
+POINTS, CONTEXT, BACKWARD = 400, 150, 200
+# The same at a glance.
+GLANCE, GLANCE_CONTEXT = 100, 40
 
-@dataclass(frozen=True)
-class Tolerances:
-    """What counts as explained.
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """How well a surface explains K points.
 
     Attributes:
-        reach: farthest counterpart, metres; about twice the spacing of the pixels on the scene.
-        offset: standard deviation of the distance from the counterpart's tangent plane, metres.
-        along: the same along that plane, metres; it tells where a face ends.
-        shade: standard deviation of the difference of two shades, see `shades`.
-        depth: how far behind a point a camera must see to prove it absent, metres.
-        behind: what a counterpart counts that faces the other way: thin walls are seen from either side, and
-            where both sides fall into one voxel its normal is that of one of them. Nothing solid is turned
-            inside out by a motion, so little is lost.
-        grazing: cosine of the angle to its normal from which a camera sees a face at all.
-        hidden: what a point that no camera can see costs, as a share of an unexplained one.
-        absent: the same of a point of a firm region that a camera sees through, with nothing around it.
-        around: observed points this near to the moved region have to be explained by it, metres.
-        backward: share of the score that these points decide.
-        context: share of the forward score that the region's surroundings decide.
+        exact: (K,) 0 .. 1, as if the thing were the same.
+        loose: (K,) 0 .. 1, with the spread that each point is allowed.
+        color: (K,) 0 .. 1, agreement of the colours; 0 where there is no counterpart.
+        index: (K,) the counterparts.
     """
 
-    reach: float = 0.015
-    offset: float = 0.005
-    along: float = 0.008
-    shade: float = 0.25
-    depth: float = 0.02
-    behind: float = 0.9
-    grazing: float = 0.25
-    hidden: float = 0.5
-    absent: float = 3.0
-    around: float = 0.04
-    backward: float = 0.25
-    context: float = 0.3
+    exact: FloatArray
+    loose: FloatArray
+    color: FloatArray
+    index: NDArray[np.int64]
+
+
+class Surface:
+    """What was observed of a scene or of a part of it.
+
+    Args:
+        cloud: at least one point, with normals.
+        views: that it was seen in.
+
+    Attributes:
+        cloud: the same.
+        tree: of its points.
+        shades: (N, 4) of its colours.
+        sample: indices of about a thousand of its points.
+    """
+
+    def __init__(self, cloud: PointCloud, views: Sequence[CameraView]) -> None:
+        self.cloud, self._views = cloud, views
+        self.tree = cKDTree(cloud.points)
+        self.shades = shades(cloud.colors)
+        # The grid has spread the points evenly already.
+        self.sample = np.arange(0, len(cloud), max(1, len(cloud) // 1000))
+
+    def explain(
+        self, points: FloatArray, normals: FloatArray, hue: FloatArray, spread: FloatArray
+    ) -> Explained:
+        """How well this explains points (K, 3) with normals (K, 3), shades (K, 4) and a spread (K,)."""
+        assert self.cloud.normals is not None
+        distance, index = self.tree.query(points, distance_upper_bound=REACH)
+        found = np.isfinite(distance)
+        index = np.where(found, index, 0).astype(np.int64)
+        n = self.cloud.normals[index]
+        offset = np.einsum("mk,mk->m", n, points - self.cloud.points[index]) ** 2
+        along = np.maximum(np.where(found, distance, 0.0) ** 2 - offset, 0.0)
+        facing = np.einsum("mk,mk->m", n, normals)
+        facing = np.where(found, np.clip(np.where(facing < 0, -BEHIND * facing, facing), 0.0, 1.0), 0.0)
+        exact = facing * np.exp(-0.5 * (offset / OFFSET**2 + along / ALONG**2))
+        more = spread**2
+        loose = facing * np.exp(-0.5 * (offset / (OFFSET**2 + more) + along / (ALONG**2 + more)))
+        color = np.exp(-0.5 * (((hue - self.shades[index]) / SHADE) ** 2).sum(axis=1))
+        return Explained(exact, loose, np.where(found, color, 0.0), index)
+
+    def seen(self, points: FloatArray, normals: FloatArray) -> tuple[BoolArray, BoolArray]:
+        """(K,) True where no view can say that a face at the point, with its normal, is not there.
+
+        A view can if the face lies in its image and turns to it, and nothing nearer stands before it. And
+        (K,) True where a view sees through the point to what is farther away.
+        """
+        hidden, through = np.ones(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
+        for view in self._views:
+            to_camera = view.T_world_camera[:3, 3] - points
+            distance = np.maximum(np.linalg.norm(to_camera, axis=1), 1e-9)
+            slant = np.einsum("mk,mk->m", to_camera, normals) / distance
+            (column, row), z, inside = (part.T for part in project(view, points))
+            depth = view.depth[row, column]
+            beyond = np.where(inside & np.isfinite(depth), depth - z, -np.inf)
+            hidden &= ~((beyond > -THROUGH) & (slant > GRAZING))
+            through |= beyond > THROUGH
+        return hidden, through
 
 
 def shades(colors: Float32Array) -> FloatArray:
@@ -56,218 +125,174 @@ def shades(colors: Float32Array) -> FloatArray:
     return np.concatenate([(colors - bright) / (bright + 0.05), 0.35 * bright], axis=1)
 
 
-class Surface:
-    """What was observed of a scene or of a part of it: a cloud with normals and the views it came from."""
-
-    def __init__(
-        self, cloud: PointCloud, views: Sequence[CameraView], tolerances: Tolerances | None = None
-    ) -> None:
-        self.cloud = cloud
-        self.tolerances = tolerances or Tolerances()
-        self._views = views
-        self._tree = cKDTree(cloud.points) if len(cloud) else None
-        self._shades = shades(cloud.colors)
-
-    def explain(self, cloud: PointCloud, T: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
-        """(M,) how well this surface explains points of a `cloud` with normals moved by `T`, 0 .. 1.
-
-        And (M,) the indices of the counterparts.
-        """
-        assert cloud.normals is not None and self.cloud.normals is not None
-        if self._tree is None:
-            return np.zeros(len(cloud)), np.zeros(len(cloud), dtype=np.int64)
-        points = se3.apply(T, cloud.points)
-        distance, index = self._tree.query(points, distance_upper_bound=self.tolerances.reach)
-        found = np.isfinite(distance)
-        index = np.where(found, index, 0).astype(np.int64)
-        normals = self.cloud.normals[index]
-        offset = np.einsum("mk,mk->m", normals, points - self.cloud.points[index])
-        facing = np.einsum("mk,mk->m", normals, se3.rotate(T, cloud.normals))
-        shade = np.linalg.norm(shades(cloud.colors) - self._shades[index], axis=1)
-        along = np.sqrt(np.maximum(np.where(found, distance, 0.0) ** 2 - offset**2, 0.0))
-        tolerances = self.tolerances
-        error = (offset / tolerances.offset) ** 2 + (shade / tolerances.shade) ** 2
-        error += (along / tolerances.along) ** 2
-        facing = np.clip(np.where(facing < 0, -tolerances.behind * facing, facing), 0.0, 1.0)
-        agreement = np.where(found, np.exp(-0.5 * error) * facing, 0.0)
-        return agreement, index
-
-    def colorless(self) -> "Surface":
-        """The same shape, all of one colour."""
-        return Surface(self.cloud.colorless(), self._views, self.tolerances)
-
-    @cached_property
-    def sample(self) -> PointCloud:
-        """At most 1000 of the points, evenly spread."""
-        return self.cloud.select(farthest_points(self.cloud.points, 1000))
-
-    def near(self, points: FloatArray) -> BoolArray:
-        """(M,) True for points around this surface."""
-        if self._tree is None:
-            return np.zeros(len(points), dtype=bool)
-        distance, _ = self._tree.query(points, distance_upper_bound=self.tolerances.around)
-        return np.isfinite(distance)
-
-    def seen(self, points: FloatArray, normals: FloatArray) -> tuple[BoolArray, BoolArray]:
-        """(M,) True where no view can say that a face at the point, with its normal, is not there.
-
-        A view can if the face lies in its image and turns to it, and nothing nearer stands before it. And
-        (M,) True where a view sees through the point to what is farther away.
-        """
-        return seen(self._views, points, normals, self.tolerances.depth, self.tolerances.grazing)
-
-    def possible(
-        self, cloud: PointCloud, weight: FloatArray, explained: FloatArray, firm: BoolArray | None = None
-    ) -> FloatArray:
-        """(M,) weights of a `cloud` with normals after what was `explained` (M,) of it.
-
-        Unexplained points that are hidden count less; of the `firm` ones, (M,), which cannot have moved on
-        their own, those that are seen to be absent count more.
-        """
-        open_points = np.flatnonzero(explained < 0.5)
-        doubtful = cloud.select(open_points)
-        assert doubtful.normals is not None
-        hidden, through = self.seen(doubtful.points, doubtful.normals)
-        possible = weight.copy()
-        possible[open_points[hidden]] *= self.tolerances.hidden
-        if firm is not None:
-            absent = through & firm[open_points] & (explained[open_points] == 0.0)
-            possible[open_points[absent]] *= self.tolerances.absent
-        return possible
-
-    def share(
-        self,
-        cloud: PointCloud,
-        weight: FloatArray,
-        T: FloatArray,
-        explained: FloatArray,
-        firm: BoolArray | None = None,
-    ) -> float:
-        """Weighted share 0 .. 1 of the moved `cloud` that is `explained` (M,); see `possible`."""
-        possible = self.possible(moved(cloud, T), weight, explained, firm)
-        return float(np.clip((weight * explained).sum() / max(possible.sum(), 1e-9), 0.0, 1.0))
-
-
-def seen(
-    views: Sequence[CameraView], points: FloatArray, normals: FloatArray, behind: float, grazing: float
-) -> tuple[BoolArray, BoolArray]:
-    """What views say of faces at points (M, 3) with normals (M, 3); see `Surface.seen`.
-
-    Args:
-        views: of the scene.
-        points: world frame, metres.
-        normals: of the faces.
-        behind: how far behind a point a camera must see to prove it absent, metres.
-        grazing: cosine of the angle to its normal from which a camera sees a face.
-    """
-    hidden, through = np.ones(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
-    for view in views:
-        to_camera = view.T_world_camera[:3, 3] - points
-        distance = np.maximum(np.linalg.norm(to_camera, axis=1), 1e-9)
-        slant = np.einsum("mk,mk->m", to_camera, normals) / distance
-        (column, row), z, inside = (part.T for part in project(view, points))
-        depth = view.depth[row, column]
-        beyond = np.where(inside & np.isfinite(depth), depth - z, -np.inf)
-        hidden &= ~((beyond > -behind) & (slant > grazing))
-        through |= beyond > behind
-    return hidden, through
-
-
-def moved(cloud: PointCloud, T: FloatArray) -> PointCloud:
-    """A cloud with normals after a motion (4, 4), or after each of several (H, 4, 4), one after the other."""
-    assert cloud.normals is not None
-    copies = int(np.prod(T.shape[:-2]))
-    return PointCloud(
-        se3.apply(T, cloud.points).reshape(-1, 3),
-        np.tile(cloud.colors, (copies, 1)),
-        np.tile(cloud.camera, copies),
-        se3.rotate(T, cloud.normals).reshape(-1, 3),
-    )
-
-
 class Template:
-    """A region ready to be judged in any query: everything that only depends on the demonstration.
+    """A region ready to be compared with any scene.
 
     Args:
         region: of a step.
+        p_goal: (3,) where the action takes the tip.
+        beside: what stands around there in the demonstrated scene, with normals; at least one point.
         views: of the demonstrated scene.
+
+    Attributes:
+        cloud: points of the region, `size` of them, then of its context.
+        hue, spread: (M, 4) shades and (M,) spread of them.
+        weights: (M, 4), see `_weights`.
+        marks: variance of the region's shades.
     """
 
-    def __init__(self, region: Region, views: Sequence[CameraView]) -> None:
-        self.surface = Surface(region.cloud, views)
-        self.whole = self.surface if region.context is None else Surface(region.whole, views)
-        self.coarse, self.coarse_weight, coarse_size = self._points(region, 120)
-        self.fine, self.fine_weight, self.size = self._points(region, 1000)
-        # The points beyond these are of the context, which may have moved on its own.
-        self.coarse_firm = region.firm & (np.arange(len(self.coarse)) < coarse_size)
-        self.fine_firm = region.firm & (np.arange(len(self.fine)) < self.size)
+    def __init__(
+        self, region: Region, p_goal: FloatArray, beside: PointCloud, views: Sequence[CameraView]
+    ) -> None:
+        chosen = farthest_points(region.cloud.points, POINTS)
+        context = region.context
+        few = farthest_points(context.points, CONTEXT) if context is not None else np.zeros(0, dtype=np.int64)
+        parts = [region.cloud.select(chosen)]
+        if context is not None:
+            parts.append(context.select(few))
+        self.cloud = concatenate(parts)
+        self.hue = shades(self.cloud.colors)
+        self.spread = np.concatenate([region.spreads[chosen], np.full(len(few), OFFSET)])
+        self.weights = self._weights(region, chosen, len(few), p_goal)
+        self.size, self.marks = len(chosen), float(self.hue[: len(chosen)].var(axis=0).sum())
+        glance = np.arange(len(self.cloud))
+        self.glance = glance[
+            (glance < GLANCE) | (glance >= self.size) & (glance < self.size + GLANCE_CONTEXT)
+        ]
+        self.whole, self.beside = Surface(region.whole, views), Surface(beside, views)
+        self.region, self.p_goal = region, p_goal
 
-    def _points(self, region: Region, count: int) -> tuple[PointCloud, FloatArray, int]:
-        """At most `count` points of the region, then half as many of its context; their weights.
+    @staticmethod
+    def _weights(region: Region, chosen: NDArray[np.int64], context: int, p_goal: FloatArray) -> FloatArray:
+        """(M, 4) of the region, near the gripper, of what stays in place, and of the context."""
+        weight = region.weight[chosen]
+        away = np.linalg.norm(region.cloud.points[chosen] - p_goal, axis=1)
+        near = weight * np.exp(-0.5 * ((away - away.min()) / NEXT) ** 2)
+        firm = weight * region.trust[chosen]
+        own = np.stack([weight, near, firm, np.zeros(len(chosen))], axis=1)
+        others = np.tile([0.0, 0.0, 0.0, 1.0], (context, 1))
+        return np.concatenate([own, others])
 
-        And how many of them are of the region.
-        """
-        chosen = farthest_points(region.cloud.points, count)
-        cloud, weight = region.cloud.select(chosen), region.weight[chosen]
-        if region.context is None:
-            return cloud, weight, len(chosen)
-        near = region.context.select(farthest_points(region.context.points, count // 2))
-        share = self.surface.tolerances.context
-        each = share / (1 - share) * weight.sum() / len(near)
-        return concatenate([cloud, near]), np.concatenate([weight, np.full(len(near), each)]), len(chosen)
+    def moved(self, T: FloatArray, which: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+        """Points (H * M, 3) and normals after each of motions (H, 4, 4), one after the other."""
+        assert self.cloud.normals is not None
+        points = se3.apply(T, self.cloud.points[which]).reshape(-1, 3)
+        return points, se3.rotate(T, self.cloud.normals[which]).reshape(-1, 3)
 
 
-class Judge:
-    """Scores motions of one region into one query, in both directions.
+def glance(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
+    """(H, 4) quick looks at motions (H, 4, 4): the region in its colours, its shape, the near, the firm."""
+    which = template.glance
+    found = surface.explain(*template.moved(T, which), *_tiled(template, which, len(T)))
+    loose, color = found.loose.reshape(len(T), -1), found.color.reshape(len(T), -1)
+    w = template.weights[which]
+    values = (loose * color, loose, loose * np.sqrt(color), loose)
+    columns = (w[:, 0], w[:, 0], w[:, 1], w[:, 2])
+    return np.stack(
+        [(v * c).sum(1) / max(c.sum(), 1e-9) for v, c in zip(values, columns, strict=True)], axis=1
+    )
 
-    Forward, the observed points have to explain the moved region; backward, the region has to explain what
-    was observed around it, which tells a thing from a larger one and a front with handles from a back.
+
+def shares(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
+    """(H, 28) what `networks.verification.EVIDENCE` names first: forward, context, backward, around."""
+    H, which = len(T), np.arange(len(template.cloud))
+    points, normals = template.moved(T, which)
+    found = surface.explain(points, normals, *_tiled(template, which, H))
+    exact, loose, color = (v.reshape(H, -1) for v in (found.exact, found.loose, found.color))
+    hidden, absent = _missing(surface, points, normals, found.loose)
+    hidden, absent = hidden.reshape(H, -1), absent.reshape(H, -1)
+    columns = []
+    for w in template.weights[:, :3].T:
+        visible = np.maximum((1 - hidden * (1 - loose)) @ w, 1e-9)
+        columns += [exact @ w / visible, loose @ w / visible, *_rest(loose, color, hidden, absent, w)]
+    w = template.weights[:, 3]
+    all_of_it = max(w.sum(), 1e-9)
+    columns += [loose @ w / all_of_it, (loose * color) @ w / np.maximum(loose @ w, 1e-9)]
+    columns += [(absent * (1 - loose)) @ w / all_of_it]
+    columns += [
+        pattern(template.hue, surface.shades[found.index].reshape(H, -1, 4), loose * template.weights[:, 0])
+    ]
+    rows = np.stack([np.asarray(c) for c in columns], axis=1)
+    backward = np.stack([_backward(template, surface, M) for M in T])
+    return np.concatenate([rows, backward], axis=1)
+
+
+def pattern(shown: FloatArray, found: FloatArray, weight: FloatArray) -> FloatArray:
+    """(H,) share of the variance of the colours found that a linear map of the colours shown explains.
+
+    It tells whether marks lie where they were shown, whatever their colours are now.
 
     Args:
-        template: of the region.
-        query: the observed scene.
+        shown: (M, 4) shades of the region.
+        found: (H, M, 4) shades of the counterparts.
+        weight: (H, M) of the points.
     """
+    w = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-9)
+    A = np.concatenate([shown, np.ones((len(shown), 1))], axis=1)
+    G = np.einsum("hm,mi,mj->hij", w, A, A) + 1e-4 * np.eye(A.shape[1])
+    B = np.linalg.solve(G, np.einsum("hm,mi,hmk->hik", w, A, found))
+    mean = np.einsum("hm,hmk->hk", w, found)
+    total = np.einsum("hm,hmk->h", w, (found - mean[:, None]) ** 2)
+    rest = np.einsum("hm,hmk->h", w, (found - A @ B) ** 2)
+    return np.asarray((total - rest) / (total + NOISE))
 
-    def __init__(self, template: Template, query: Surface) -> None:
-        self._template, self._query = template, query
 
-    def glance(self, T_query_support: FloatArray) -> FloatArray:
-        """(H,) quick forward scores, 0 .. 1, of motions (H, 4, 4)."""
-        copies = moved(self._template.coarse, T_query_support)
-        weight = np.tile(self._template.coarse_weight, len(T_query_support))
-        explained, _ = self._query.explain(copies, np.eye(4))
-        firm = np.tile(self._template.coarse_firm, len(T_query_support))
-        possible = self._query.possible(copies, weight, explained, firm)
-        got, wanted = ((v.reshape(len(T_query_support), -1)).sum(1) for v in (weight * explained, possible))
-        scores: FloatArray = np.clip(got / np.maximum(wanted, 1e-9), 0.0, 1.0)
-        return scores
+def _rest(
+    loose: FloatArray, color: FloatArray, hidden: FloatArray, absent: FloatArray, w: FloatArray
+) -> list[FloatArray]:
+    got, total = np.maximum(loose @ w, 1e-9), max(float(w.sum()), 1e-9)
+    return [
+        (loose * color) @ w / got,
+        (loose * (color < CLASH)) @ w / got,
+        (hidden * (1 - loose)) @ w / total,
+        (absent * (1 - loose)) @ w / total,
+    ]
 
-    def judge(self, T_query_support: FloatArray) -> Hypothesis:
-        """The motion as a hypothesis, scored in both directions."""
-        template, fine = self._template, self._template.fine
-        explained, counterpart = self._query.explain(fine, T_query_support)
-        forward = self._query.share(
-            fine, template.fine_weight, T_query_support, explained, template.fine_firm
-        )
-        part = self._query.tolerances.backward
-        score = (1 - part) * forward + part * self._backward(se3.invert(T_query_support))
-        good = np.flatnonzero(explained[: template.size] > 0.3)
-        p_query = self._query.cloud.points[counterpart[good]]
-        return Hypothesis(T_query_support, score, fine.points[good], p_query)
 
-    def in_view(self, T_query_support: FloatArray) -> float:
-        """Share 0 .. 1 of the moved region, without context or what is hidden, that is explained."""
-        size, weight = self._template.size, self._template.fine_weight[: self._template.size]
-        own = moved(self._template.fine.select(np.arange(size)), T_query_support)
-        assert own.normals is not None
-        explained, _ = self._query.explain(own, np.eye(4))
-        hidden, _ = self._query.seen(own.points, own.normals)
-        got = weight * explained
-        missing = weight * (1 - explained) * ~hidden
-        return float(got.sum() / max((got + missing).sum(), 1e-9))
+def _missing(
+    surface: Surface, points: FloatArray, normals: FloatArray, loose: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(K,) 1 where a point that is not explained is hidden, and where it is seen through."""
+    doubtful = np.flatnonzero(loose < 0.5)
+    hidden, absent = np.zeros(len(points)), np.zeros(len(points))
+    h, a = surface.seen(points[doubtful], normals[doubtful])
+    hidden[doubtful], absent[doubtful] = h, a & ~h
+    return hidden, absent
 
-    def _backward(self, T_support_query: FloatArray) -> float:
-        sample = self._query.sample
-        around = sample.select(self._template.surface.near(se3.apply(T_support_query, sample.points)))
-        explained, _ = self._template.whole.explain(around, T_support_query)
-        return self._template.whole.share(around, np.ones(len(around)), T_support_query, explained)
+
+def _tiled(template: Template, which: NDArray[np.int64], copies: int) -> tuple[FloatArray, FloatArray]:
+    return np.tile(template.hue[which], (copies, 1)), np.tile(template.spread[which], copies)
+
+
+def _backward(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
+    """(6,) what the region explains of what is around it, and what is alike around the gripper."""
+    whole, back = template.whole, se3.invert(T)
+    points = se3.apply(back, surface.cloud.points[surface.sample])
+    near = np.flatnonzero(np.isfinite(whole.tree.query(points, distance_upper_bound=AROUND)[0]))
+    found = _explain(whole, surface.cloud.select(surface.sample[_some(near)]), back)
+    got, all_of_it = max(float(found.loose.sum()), 1e-9), max(len(found.loose), 1)
+    color, clash = found.loose @ found.color / got, found.loose @ (found.color < CLASH) / got
+    forward = _explain(surface, template.beside.cloud, T).loose
+    at = se3.apply(T, template.p_goal[None])[0]
+    inside = np.asarray(surface.tree.query_ball_point(at, BESIDE, return_sorted=True), dtype=np.int64)
+    there = _explain(template.beside, surface.cloud.select(_some(inside)), back).loose
+    return np.array([got / all_of_it, color, clash, np.log1p(len(near)) / 5, forward.mean(), _mean(there)])
+
+
+def _some(index: NDArray[np.int64]) -> NDArray[np.int64]:
+    """About `BACKWARD` of them, spread over the grid in which they are sorted."""
+    return index[:: max(1, len(index) // BACKWARD)]
+
+
+def _mean(values: FloatArray) -> float:
+    """1 if there is nothing."""
+    return float(values.mean()) if len(values) else 1.0
+
+
+def _explain(surface: Surface, cloud: PointCloud, T: FloatArray) -> Explained:
+    """How well a surface explains a cloud with normals, moved by `T`, but for what cameras leave open."""
+    assert cloud.normals is not None
+    spread = np.full(len(cloud), OFFSET)
+    return surface.explain(
+        se3.apply(T, cloud.points), se3.rotate(T, cloud.normals), shades(cloud.colors), spread
+    )

@@ -1,77 +1,96 @@
-"""The learned matcher: the paper's region and matching networks, then the same judgement as registration.
+"""The learned matcher: the paper's region and matching networks, before the search.
 
-The region network says once per demonstrated step which points the action is fixed to. The matching network
-says which points of the query they are. The paper fits one motion to all of these matches; where several
-equal things are in view that is the average of several answers, so that here triples of matches that agree
-propose motions, and what the cameras saw decides between them and refines the best.
+The region network says once per demonstrated step which points the action is fixed to, and how far each may
+be off on another thing of its kind. The matching network says which points of the query they are. The paper
+fits one motion to all of these matches; here that is one proposal among others.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
 
 import numpy as np
 import torch
+from torch import Tensor
 
-from imop.geometry.cloud import PointCloud
-from imop.geometry.icp import SMALLEST
+from imop.geometry import se3
+from imop.geometry.cloud import PointCloud, farthest_points
+from imop.geometry.clusters import connected, find_objects
 from imop.geometry.neighbours import nearest, within
 from imop.networks.graph import Graph, build_graph
+from imop.networks.matching import reposition
 from imop.networks.model import Model
-from imop.policy.contacts import GRASP, SAME
-from imop.policy.evidence import Surface
-from imop.policy.inquiry import Inquiry
-from imop.policy.learned_region import FEWEST, ShownRegion, find_shown_regions
-from imop.policy.matcher import Hypothesis, Scene, Transition
-from imop.policy.matches import Matches
-from imop.policy.region import ENOUGH, Region
-from imop.policy.search import Search
-from imop.policy.sought import Sought, SoughtConfig, nodes_at
-from imop.policy.things import Things, without_held
+from imop.networks.region import StepBatch, one_step
+from imop.policy.contacts import SAME, Contacts, find_contacts, is_open
+from imop.policy.interfaces import BEGINNING, Candidate, Feasible, PolicyConfig, Progress, Scene, Transition
+from imop.policy.proposals import Asked, Matches
+from imop.policy.region import ENOUGH, Region, find_region
+from imop.policy.search import StepSearch
+from imop.policy.verification import Verifier
 from imop.types import FloatArray
 
-# Matches of a part nearer than this to where a motion carries them speak for it, metres.
-TIGHT = 0.015
-# A region that no motion explains better than this may have bent. What of it is within `NEXT_TO` metres of
-# where the gripper goes has not. It is found instead if this share of its matches speaks for that, if they
-# support the whole less than this share of what they support the part, if it is explained there better than
-# where the whole is by this score, and about as well as the whole.
-BENT = 0.7
-NEXT_TO = 0.05
-CERTAIN, CONTRADICTED = 0.8, 0.9
-BETTER, AS_GOOD = 0.1, 0.85
-# What is explained better than this does not bend.
-STIFF = 0.8
-# A hand that is as wide open as it was shown, up to this share of its stroke, holds what it held.
-AS_WIDE = 0.04
-# What the hand takes is somewhere else than the region says only if it is explained there by this score.
-FOUND = 0.6
-# A region that no motion explains better than this may have another colour. What is found by its shape alone
-# is as sure as this at most.
-LOST, BY_SHAPE = 0.45, 0.8
-# How many of the best motions compete with those to all other things.
-KEPT = 6
+# A region of fewer points cannot be matched.
+FEWEST = 8
+# Share of what is held in the region of a step that lets go from which nothing else is in it.
+LETS_GO = 0.8
+# What is connected to the region, this near to it (metres), is its context.
+AROUND = 0.1
+# What the hand takes is told from the rest of the region if the region has this share of it, and if it is
+# less than this share of the region.
+KNOWN, MUCH_MORE = 0.5, 0.8
+# A region of fewer points is a scrap. It is not believed if it is farther from where the gripper goes than
+# something else is, by this much, metres.
+SCRAP, FARTHER = 100, 0.05
+# A node is in focus if a point in focus is this near to it, metres.
+FOCUS = 0.01
+# Points nearer to each other than this are of one voxel or of neighbours, metres.
+NEXT = 0.006
+
+
+@dataclass(frozen=True, eq=False)
+class ShownRegion:
+    """A region and where it comes from.
+
+    Attributes:
+        steps: a batch of the step alone, as the networks see it.
+        probability: (N,) of the points of the support state to be in the region, by the network.
+        trust: (N,) of them in a fit to another thing; see `RegionPrediction.trust`.
+        inside: (R,) those that are, in order of their index.
+        region: the same on the full cloud.
+        completed: (M, 3) points of the region with the things that are mostly in it whole, metres.
+        payload: what the hand takes next, if the region is much more than that. It will move on its own.
+    """
+
+    steps: StepBatch
+    probability: Tensor
+    trust: Tensor
+    inside: Tensor
+    region: Region
+    completed: FloatArray
+    payload: PointCloud | None
+
+    @property
+    def graph(self) -> Graph:
+        """Of the support state."""
+        return self.steps.before
 
 
 @dataclass(frozen=True)
 class LearnedMatcher:
-    """Region and matching networks, no descriptors made by hand.
+    """Region and matching networks.
 
     Attributes:
         model: the networks; see `networks.model.load_model`.
-        threshold: least probability of a region point.
-        sought: how regions are looked for.
+        config: of the search.
     """
 
     model: Model
-    threshold: float = 0.5
-    sought: SoughtConfig = field(default_factory=SoughtConfig)
+    config: PolicyConfig = field(default_factory=PolicyConfig)
 
     def prepare(self, steps: Sequence[Transition]) -> list["LearnedStep"]:
         """Find the regions of a demonstration's steps and describe them."""
-        shown = find_shown_regions(self.model, steps, self.threshold)
+        shown = find_shown_regions(self.model, steps, self.config.threshold)
         return [
-            LearnedStep(self.model, self.sought, step, region)
+            LearnedStep(self.model, self.config, step, region)
             for step, region in zip(steps, shown, strict=True)
         ]
 
@@ -79,183 +98,194 @@ class LearnedMatcher:
 class LearnedStep:
     """A demonstrated step prepared for the matching network."""
 
-    def __init__(self, model: Model, config: SoughtConfig, step: Transition, shown: ShownRegion) -> None:
-        self._model, self._config, self._before = model, config, step.before
+    def __init__(self, model: Model, config: PolicyConfig, step: Transition, shown: ShownRegion) -> None:
+        self._model, self._config, self._shown = model, config, shown
+        points = shown.graph.points[shown.inside].double().numpy()
+        few = farthest_points(points, model.config.matching.max_region)
+        self._chosen = shown.inside[torch.from_numpy(few).sort().values]
         with torch.inference_mode():
-            features = model.matching.backbone(shown.graph)
-        prepare = partial(Sought, config, model, step.before, shown, features)
-        region, taken, self._completed = shown.region, shown.taken, shown.completed
-        self._sought, self._taken = prepare(region), None
-        if taken is not None and len(nodes_at(shown.graph, taken)) >= FEWEST:
-            self._taken = prepare(taken)
-            rest = region.whole.select(~within(region.whole.points, taken.cloud.points, SAME))
-            self._rest = Surface(rest, ())
-        self._goal = step.action.T_world_gripper[:3, 3]
-        self._part = region.next_to(self._goal, NEXT_TO)
-        self._opening = step.before.observation.gripper_opening
-        tip = step.before.observation.T_world_gripper[None, :3, 3]
-        touched = len(self._part.cloud) >= SMALLEST and within(tip, self._part.cloud.points, GRASP)[0]
-        self._in_hand = shown.holding and bool(touched)
-
-    @cached_property
-    def _search_part(self) -> Search:
-        """Of what is next to the gripper; few steps need it, and it takes long to prepare."""
-        part = self._part.colorless() if self._in_hand else self._part
-        return Search(self._config.search, self._before, part)
+            self._described = model.matching.describe(shown.steps, self._chosen)
+        self._trust = shown.trust[self._chosen]
+        self._weight = shown.probability[self._chosen].double().numpy()
+        verifier = Verifier(model.verification)
+        self.search = StepSearch(config, step, shown.region, shown.payload, verifier, self._ask)
 
     @property
     def region(self) -> FloatArray:
         """(M, 3) points of the region in the demonstrated scene, with what is mostly in it completed."""
-        return self._completed
+        return self._shown.completed
 
-    def match(self, query: Scene, hints: Sequence[FloatArray] = ()) -> tuple[Hypothesis, ...]:
-        """Where the region is in the query, best first; see `PreparedStep.match`."""
-        if len(query.fused) < 5:
-            return ()
-        return self._followed(query, hints) or self._searched(query, hints)
+    def locate(
+        self, query: Scene, progress: Progress = BEGINNING, feasible: Feasible | None = None
+    ) -> tuple[Candidate, ...]:
+        """Where the region may be in the query, likeliest first; see `PreparedStep.locate`."""
+        return self.search.locate(query, progress, feasible)
 
-    def _followed(self, query: Scene, hints: Sequence[FloatArray]) -> tuple[Hypothesis, ...]:
-        """Where the region is if it has moved as what was acted on before; no network need be asked."""
-        if not hints:
-            return ()
-        search = self._sought.search
-        standing = query.fused.select(~query.ground.bare)
-        near = standing.select(search.around(standing.points, search.likely(query, hints)))
-        near = without_held(near, query, self._sought.region)
-        if len(near) < SMALLEST:
-            return ()
-        things = Things(query, near)
-        inquiry = Inquiry(search, things, hints)
-        found = inquiry.followed()
-        if not found and self._in_hand and abs(query.observation.gripper_opening - self._opening) < AS_WIDE:
-            slipped = inquiry.slipped()
-            return (slipped,) if slipped.score > BENT else self._in_the_hand(things).repeated()
-        if found and self._taken is not None:
-            taken = self._there(self._taken, things, found[0].T_query_support)
-            return found if taken.score > BENT else ()
-        return found
-
-    def _searched(self, query: Scene, hints: Sequence[FloatArray]) -> tuple[Hypothesis, ...]:
-        """Where the networks and what was seen say that the region is."""
-        standing = query.cloud.select(~query.ground.bare)
-        standing = without_held(standing, query, self._sought.region)
-        if len(standing) < SMALLEST:
-            return ()
-        things = Things(query, standing)
+    def _ask(self, query: Scene) -> Asked:
+        """The network's matches in a query, and the motions that most of them agree on."""
         seen = build_graph(query.cloud, self._model.config.graph, query.ground)
-        matches, fit = self._sought.matched(seen)
-        inquiry = Inquiry(self._sought.search, things, hints, partial(self._sought.opinion, matches))
-        whole = self._whole(matches, fit, inquiry)
-        found = whole if self._taken is None else self._loose(self._taken, seen, inquiry, whole)
-        # What is in the hand is where the hand is, whatever its colour.
-        known = self._in_hand or found[0].score > LOST
-        return found if known else self._recolored(inquiry, found)
-
-    def _whole(self, matches: Matches, fit: FloatArray, inquiry: Inquiry) -> tuple[Hypothesis, ...]:
-        """Where the whole region is, or the part of it that is next to the gripper."""
-        sought, things = self._sought, inquiry.things
-        if confirmed := inquiry.confirmed(sought.trusted(matches, fit)):
-            return self._bent(inquiry, confirmed)
-        whole = inquiry.search(np.concatenate([fit, sought.seeds(matches, things)]))
-        if whole[0].score > BENT:
-            return whole
-        best = np.stack([hypothesis.T_query_support for hypothesis in whole[:KEPT]])
-        whole = inquiry.search(np.concatenate([best, sought.anywhere(things)]))
-        if whole[0].score > BENT:
-            return whole
-        if self._in_hand:
-            return self._held(inquiry, whole)
-        return self._bent(inquiry, self._unbent(matches, inquiry, whole))
-
-    @staticmethod
-    def _there(taken: Sought, things: Things, T_whole: FloatArray) -> Hypothesis:
-        """What the hand takes, where the region says that it is."""
-        return Inquiry(taken.search, things).finished(T_whole)
-
-    def _loose(
-        self, taken: Sought, seen: Graph, inquiry: Inquiry, whole: tuple[Hypothesis, ...]
-    ) -> tuple[Hypothesis, ...]:
-        """Where what the hand takes is, if it is not where it would be in the whole region.
-
-        Notes on a safe may lie anywhere on it. They are looked for in what the rest of the region leaves.
-        """
-        T_whole, things = whole[0].T_query_support, inquiry.things
-        there = self._there(taken, things, T_whole)
-        left = things.unexplained(self._rest, T_whole)
-        if there.score > BENT or left is None:
-            return whole
-        matches, fit = taken.matched(seen)
-        alone = Inquiry(taken.search, things, inquiry.hints, partial(taken.opinion, matches))
-        found = alone.search(
-            np.concatenate([T_whole[None], fit, taken.seeds(matches, left), taken.anywhere(left)])
+        with torch.inference_mode():
+            found = self._model.matching.match(self._described, seen)
+            fits = [
+                reposition(found.last, found.p_region, found.p_query, trust)
+                for trust in (None, self._trust[None])
+            ]
+        matches = likeliest(
+            found.last[0], self._shown.graph, self._chosen, seen, self._weight, self._config.counterparts
         )
-        return found if found[0].score > max(FOUND, there.score + BETTER) else whole
+        fit, firm = (np.asarray(T[0].double().numpy()) for T in fits)
+        return Asked({"fit": fit, "firm": firm}, matches)
 
-    def _recolored(self, inquiry: Inquiry, found: tuple[Hypothesis, ...]) -> tuple[Hypothesis, ...]:
-        """What is of the same shape in another colour, rather not in that of another thing shown.
 
-        Where the cups other than the red one have new colours, the red one is still not one of them.
-        """
-        sought, things = self._taken or self._sought, inquiry.things
-        seeds = [np.stack([h.T_query_support for h in found[:KEPT]]), sought.anywhere(things)]
-        gray = Inquiry(sought.search_colorless, things.colorless(), inquiry.hints)
-        shaped = gray.search(np.concatenate(seeds))
-        if shaped[0].score < BENT:
-            return found
-        known = things.colored_like(self._beside(sought.region))
-        points = things.cloud.points
+def find_shown_regions(model: Model, steps: Sequence[Transition], threshold: float) -> list[ShownRegion]:
+    """The region of every step of one demonstration.
 
-        def another(hypothesis: Hypothesis) -> bool:
-            return bool(known[nearest(hypothesis.p_query, points)[1][:, 0]].mean() > 0.5)
+    Args:
+        model: with the region network.
+        steps: of the demonstration.
+        threshold: least probability of a region point.
+    """
+    objects = [find_objects(step.before.cloud, step.before.ground.plane) for step in steps]
+    contacts = find_contacts(steps, objects)
+    return [
+        _find(model, steps, k, contacts, threshold, find_region(steps, k, objects[k], contacts).cloud.points)
+        for k in range(len(steps))
+    ]
 
-        good = [h for h in shaped if h.score > BENT]
-        return tuple(replace(h, score=BY_SHAPE * h.score) for h in sorted(good, key=another))
 
-    def _beside(self, region: Region) -> PointCloud:
-        """What else than a region stood in the demonstrated scene."""
-        cloud = self._before.cloud
-        return cloud.select(~self._before.ground.bare & ~within(cloud.points, region.cloud.points, SAME))
+def _find(
+    model: Model,
+    steps: Sequence[Transition],
+    k: int,
+    contacts: Contacts,
+    threshold: float,
+    instead: FloatArray,
+) -> ShownRegion:
+    """The region of step `k`, or what is at points (M, 3) `instead` if that cannot be the region."""
+    step, config = steps[k], model.config.graph
+    before, after = (build_graph(s.cloud, config, s.ground) for s in (step.before, step.after))
+    batch = _batch(step, before, after, config.neighbours)
+    with torch.inference_mode():
+        predicted = model.region(batch)
+    nodes = before.points.double().numpy()
+    meant = torch.from_numpy(step.before.focused(nodes, FOCUS))
+    probability = torch.where(meant, predicted.probability, 0.0) if meant.any() else predicted.probability
+    inside = _likely(probability, threshold)
+    standing = ~step.before.ground.bare[nearest(nodes, step.before.cloud.points)[1][:, 0]]
+    p_held = contacts.p_gripper_held[k]
+    region = _dense(step, nodes, probability.double().numpy(), inside, p_held)
+    beside = np.flatnonzero(within(nodes, instead, SAME) & standing)
+    # The ground is the same everywhere, and a scrap somewhere else says nothing about this place.
+    nothing = standing[inside].sum() < FEWEST
+    scrap = len(region.cloud) < SCRAP and _away(step, p_held, region.cloud.points) > FARTHER + _away(
+        step, p_held, instead
+    )
+    if len(beside) >= FEWEST and (nothing or scrap):
+        inside = torch.from_numpy(beside)
+        region = _dense(step, nodes, probability.double().numpy(), inside, p_held)
+    payload = _payload(step, region, contacts.taken(k, steps))
+    points = _completed(step, nodes, probability, region, threshold)
+    owner = nearest(region.cloud.points, nodes)[1][:, 0]
+    region = replace(region, spread=predicted.spread.double().numpy()[owner])
+    return ShownRegion(batch, probability, predicted.trust, inside, region, points, payload)
 
-    def _in_the_hand(self, things: Things) -> Inquiry:
-        """About what is next to the gripper, whatever its colour: it has moved as the gripper has."""
-        return Inquiry(self._search_part, things.colorless())
 
-    def _held(self, inquiry: Inquiry, whole: tuple[Hypothesis, ...]) -> tuple[Hypothesis, ...]:
-        """What is in the hand: as it was found, if that is where it has been carried, else as carried."""
-        closer = self._in_the_hand(inquiry.things)
-        carried = closer.repeated()
-        alike = closer.alike(carried[0].T_query_support, whole[0].T_query_support)
-        return whole if alike and whole[0].score > carried[0].score else carried
+def _away(step: Transition, p_gripper_held: FloatArray, points: FloatArray) -> float:
+    """Metres from points (M, 3) to where the step takes the tip and what is held."""
+    p_goal = se3.apply(step.action.T_world_gripper, np.concatenate([np.zeros((1, 3)), p_gripper_held]))
+    return float(nearest(p_goal, points)[0].min())
 
-    def _bent(self, inquiry: Inquiry, found: tuple[Hypothesis, ...]) -> tuple[Hypothesis, ...]:
-        """Where what is next to the gripper is, if it points elsewhere than where it was found."""
-        points = self._part.cloud.points
-        if self._in_hand or found[0].score > STIFF or len(points) < ENOUGH:
-            return found
-        goal = points[nearest(self._goal[None], points)[1][0, 0]]
-        return Inquiry(self._search_part, inquiry.things, inquiry.hints).bent(found, goal)
 
-    def _unbent(
-        self, matches: Matches, inquiry: Inquiry, whole: tuple[Hypothesis, ...]
-    ) -> tuple[Hypothesis, ...]:
-        """Where the part of the region next to the gripper is, if that contradicts where the whole is."""
-        near = matches.of(self._part.cloud.points)
-        if len(near.x) < 3 or len(self._part.cloud) < SMALLEST:
-            return whole
-        opinion = partial(self._sought.opinion, near)
-        T_whole = whole[0].T_query_support
-        for_whole = self._sought.opinion(near, T_whole[None], TIGHT)[0]
-        seeds = self._sought.seeds(near, inquiry.things)
-        if for_whole >= CONTRADICTED or not len(seeds):
-            return whole
-        closer = Inquiry(self._search_part, inquiry.things, inquiry.hints, opinion)
-        part = closer.search(seeds)
-        T_part = part[0].T_query_support
-        if closer.alike(T_part, T_whole):
-            return whole
-        certain = opinion(T_part[None])[0] > CERTAIN
-        contradicted = for_whole < CONTRADICTED * self._sought.opinion(near, T_part[None], TIGHT)[0]
-        explained = max(AS_GOOD * whole[0].score, closer.finished(T_whole).score + BETTER)
-        if not (certain and contradicted and part[0].score > explained):
-            return whole
-        return closer.kept(part)
+def _batch(step: Transition, before: Graph, after: Graph, neighbours: int) -> StepBatch:
+    observation, action = step.before.observation, step.action
+    poses = np.stack([action.T_world_gripper, observation.T_world_gripper])
+    gripper = torch.tensor([is_open(step), action.gripper_open], dtype=torch.float32)
+    return one_step(before, after, torch.from_numpy(poses.astype(np.float32)), gripper, neighbours)
+
+
+def _likely(probability: Tensor, threshold: float) -> Tensor:
+    """(R,) points of the region, in order of their index; the likeliest few if there seems to be none."""
+    count = int((probability > threshold).sum())
+    count = min(max(count, FEWEST), len(probability))
+    return probability.topk(count).indices.sort().values
+
+
+def _dense(
+    step: Transition, nodes: FloatArray, probability: FloatArray, inside: Tensor, p_gripper_held: FloatArray
+) -> Region:
+    """The region on the full cloud: every point belongs as much as the nearest of `nodes` (N, 3) does."""
+    cloud = step.before.cloud
+    weight = np.zeros(len(nodes))
+    weight[inside] = np.maximum(probability[inside], 1e-3)
+    owner = nearest(cloud.points, nodes)[1][:, 0]
+    member = weight[owner] > 0
+    # The bare table is found everywhere.
+    standing = ~step.before.ground.bare
+    member = member & standing if (member & standing).sum() >= FEWEST else member
+    p_held = se3.apply(step.before.observation.T_world_gripper, p_gripper_held)
+    in_hand = within(cloud.points, p_held, SAME)
+    # A step that lets go is fixed to what stays, not to what is let go.
+    most = LETS_GO if step.action.gripper_open else 0.5
+    if (member & ~in_hand).sum() >= FEWEST and in_hand[member].mean() < most:
+        member = member & ~in_hand
+    else:
+        in_hand, p_gripper_held = np.zeros(len(cloud), dtype=bool), p_gripper_held[:0]
+    region = cloud.select(member)
+    free = np.flatnonzero(standing & ~in_hand | member)
+    labels, own = connected(cloud.points[free]), member[free]
+    # What only stands by says nothing about the region.
+    around = ~own & np.isin(labels, labels[own]) & within(cloud.points[free], region.points, AROUND)
+    context = cloud.select(free[around]) if around.any() else None
+    return Region(region, weight[owner[member]], p_gripper_held, context)
+
+
+def _completed(
+    step: Transition, nodes: FloatArray, probability: Tensor, region: Region, threshold: float
+) -> FloatArray:
+    """(M, 3) points of the region and of the things that are in it by the mean of their probabilities.
+
+    The network leaves holes where little is seen. What it is sure of is enough to find a thing again, and
+    leads to better poses than the rest would.
+    """
+    cloud = step.before.cloud
+    p_held = se3.apply(step.before.observation.T_world_gripper, region.p_gripper_held)
+    rest = cloud.points[~step.before.ground.bare & ~within(cloud.points, p_held, SAME)]
+    if not len(rest):
+        return region.cloud.points
+    labels = connected(rest)
+    of_node = probability.double().numpy()[nearest(rest, nodes)[1][:, 0]]
+    mean = np.bincount(labels, weights=of_node) / np.bincount(labels)
+    return np.unique(np.concatenate([region.cloud.points, rest[mean[labels] > threshold]]), axis=0)
+
+
+def _payload(step: Transition, region: Region, p_taken: FloatArray) -> PointCloud | None:
+    """What the hand takes next, at points (H, 3), if the region is much more than that."""
+    if len(p_taken) < ENOUGH or within(p_taken, region.cloud.points, SAME).mean() < KNOWN:
+        return None
+    cloud = step.before.cloud.select(within(step.before.cloud.points, p_taken, NEXT))
+    small = len(cloud) < ENOUGH or within(region.cloud.points, cloud.points, SAME).mean() > MUCH_MORE
+    return None if small else cloud
+
+
+def likeliest(
+    C: Tensor, region: Graph, chosen: Tensor, query: Graph, probability: FloatArray, counterparts: int
+) -> Matches:
+    """The likeliest query points of every region point.
+
+    Args:
+        C: (R, N) correspondence matrix.
+        region: the demonstrated scene.
+        chosen: (R,) its points that are the region.
+        query: the observed scene, of N points.
+        probability: (R,) of being in the region.
+        counterparts: how many for each.
+    """
+    weight, best = C.topk(min(counterparts, C.shape[1]), dim=1)
+    i = torch.arange(len(weight)).repeat_interleave(weight.shape[1])
+    x, n_x = (values[chosen][i].double().numpy() for values in _surface(region))
+    y, n_y = (values[best.flatten()].double().numpy() for values in _surface(query))
+    return Matches(x, n_x, y, n_y, weight.flatten().double().numpy() * probability[i] + 1e-6)
+
+
+def _surface(graph: Graph) -> tuple[Tensor, Tensor]:
+    return graph.levels[0].points, graph.levels[0].normals

@@ -1,24 +1,27 @@
 """The policy: watch a demonstration once, then act in scenes that were never seen."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from imop.errors import CorruptData, InvalidInput, NoConfidentMatch
+from imop.geometry import se3
+from imop.geometry.focus import Focus, in_focus
 from imop.geometry.perception import Perception
 from imop.geometry.view_alignment import corrected, find_errors
 from imop.networks.model import BUNDLED, load_model
-from imop.policy.hypotheses import confidence
+from imop.policy.interfaces import (
+    BEGINNING,
+    Feasible,
+    Matcher,
+    PreparedStep,
+    Progress,
+    Scene,
+    Transition,
+)
 from imop.policy.learned import LearnedMatcher
-from imop.policy.matcher import Hypothesis, Matcher, PreparedStep, Scene, Transition
 from imop.policy.router import AdvancingRouter, LearnedRouter, Router
 from imop.types import Action, Demonstration, FloatArray, Match, Observation
-
-Feasible = Callable[[FloatArray], bool]
-
-# A hypothesis with this share of the best one's score may take its place if the arm cannot go there.
-INSTEAD = 0.8
 
 
 class OneShotPolicy:
@@ -30,8 +33,8 @@ class OneShotPolicy:
         router: chooses the demonstrated step; by default they follow each other. It may be replaced before
             anything is watched.
         min_confidence: below it `act` raises `NoConfidentMatch`; 0 acts always.
-        feasible: whether the arm can take the gripper to T_world_gripper (4, 4); of poses that are about as
-            right, the first feasible one is taken.
+        feasible: whether the arm can take the gripper to T_world_gripper (4, 4); the likeliest candidate that
+            it can follow is taken. If it can follow none, the action says so (`Action.reachable`).
 
     Raises:
         InvalidInput: for a `min_confidence` out of its range.
@@ -51,12 +54,12 @@ class OneShotPolicy:
         self._perception = perception
         self.router = router or AdvancingRouter()
         self._min_confidence = min_confidence
-        self._feasible = feasible or (lambda T_world_gripper: True)
+        self._feasible = feasible
         self._demonstrations: list[list[Transition]] = []
         self._prepared: list[list[PreparedStep]] = []
         self._cameras: set[str] = set()
         self._camera_errors: dict[str, FloatArray] = {}
-        self._hints: list[FloatArray] = []
+        self._progress = BEGINNING
 
     @classmethod
     def from_pretrained(
@@ -89,18 +92,25 @@ class OneShotPolicy:
         router = LearnedRouter(model) if routed else None
         return cls(LearnedMatcher(model), perception or Perception(), router, min_confidence, feasible)
 
-    def watch(self, demonstration: Demonstration) -> None:
+    def watch(self, demonstration: Demonstration, focus: Focus | None = None) -> None:
         """Take in a demonstration; a further call adds another one.
 
+        Args:
+            demonstration: what was shown.
+            focus: the thing in the first observation that is acted on first, if somebody says so; it is
+                what the steps until the gripper closes refer to.
+
         Raises:
-            InvalidInput: if an observation has no usable depth.
+            InvalidInput: if an observation has no usable depth, or the focus does not fit it.
         """
         observations = [keyframe.observation for keyframe in demonstration.keyframes]
         seen = [*observations, demonstration.final]
         if self._perception.align_views:
             # One set-up has one calibration: all that is shown tells of it.
             self._camera_errors |= find_errors(seen, self._camera_errors)
-        scenes = [self._scene(observation) for observation in seen]
+        scenes = [self.see(observation) for observation in seen]
+        if focus is not None:
+            scenes = _focused(scenes, demonstration, focus)
         steps = [
             Transition(before, after, keyframe.action)
             for before, after, keyframe in zip(scenes, scenes[1:], demonstration.keyframes, strict=False)
@@ -112,15 +122,20 @@ class OneShotPolicy:
 
     def reset(self) -> None:
         """Begin a new episode."""
-        self._hints = []
+        self._progress = BEGINNING
         self.router.reset()
 
-    def act(self, observation: Observation) -> Action:
+    def act(self, observation: Observation, focus: Focus | None = None) -> Action:
         """The action for what is seen now, with its confidence and the matched points.
 
+        Args:
+            observation: what is seen.
+            focus: which thing is meant, if a person, a detector or a click says so: what lies outside is no
+                candidate for what this step acts on.
+
         Raises:
-            InvalidInput: if nothing was watched, a camera of the demonstration is missing, or no depth was
-                measured.
+            InvalidInput: if nothing was watched, a camera of the demonstration is missing, no depth was
+                measured, or the focus does not fit the observation.
             NoConfidentMatch: if the confidence is below `min_confidence`.
         """
         if not self._demonstrations:
@@ -129,37 +144,67 @@ class OneShotPolicy:
             raise InvalidInput(
                 "views", f"camera {missing[0]} is missing", f"all of {', '.join(sorted(self._cameras))}"
             )
-        query = self._scene(observation)
+        query = self.see(observation, focus)
         number, step = self.router.route(query)
-        demonstrated = self._demonstrations[number][step].action
-        prepared = self._prepared[number][step]
-        hypotheses = prepared.match(query, self._hints)
-        trust = confidence(hypotheses, demonstrated.T_world_gripper)
-        if trust < self._min_confidence or not hypotheses:
-            raise NoConfidentMatch(trust, self._min_confidence)
+        action = self.locate(query, step, number, self._progress)
         self.router.took(number, step)
-        best = self._chosen(hypotheses, demonstrated.T_world_gripper)
-        self._hints = [best.T_query_support]
-        T_world_gripper = _orthonormal(best.T_query_support @ demonstrated.T_world_gripper)
-        match = Match(step, best.p_support, best.p_query, prepared.region)
-        return Action(T_world_gripper, demonstrated.gripper_open, demonstrated.allow_collisions, trust, match)
+        assert action.match is not None
+        self._progress = Progress(action.match.T_query_support)
+        return action
 
-    def _chosen(self, hypotheses: Sequence[Hypothesis], T_demonstrated: FloatArray) -> Hypothesis:
-        """The first that the arm can follow among those about as good as the best; else the best."""
-        good = [h for h in hypotheses if h.score >= INSTEAD * hypotheses[0].score]
-        able = (h for h in good if self._feasible(_orthonormal(h.T_query_support @ T_demonstrated)))
-        return next(able, hypotheses[0])
+    def see(self, observation: Observation, focus: Focus | None = None) -> Scene:
+        """An observation as the policy works on it: views brought together, fused, without the robot.
 
-    def _scene(self, observation: Observation) -> Scene:
+        Raises:
+            InvalidInput: if no depth was measured, or the focus does not fit the observation.
+        """
         if self._perception.align_views:
             # A camera may have been knocked since; else the errors stay as they are.
             observation = corrected(observation, find_errors([observation], self._camera_errors))
-        return Scene(observation, self._perception.points(observation))
+        cloud = self._perception.points(observation)
+        return Scene(observation, cloud, None if focus is None else in_focus(focus, observation, cloud))
+
+    def locate(
+        self, query: Scene, step: int, demonstration: int = 0, progress: Progress = BEGINNING
+    ) -> Action:
+        """The action of a demonstrated step in a scene; asking changes nothing.
+
+        Args:
+            query: the scene, from `see`.
+            step: of the demonstration.
+            demonstration: number of it, in the order in which they were watched.
+            progress: of the episode.
+
+        Raises:
+            NoConfidentMatch: if the confidence is below `min_confidence`, or nothing was found.
+        """
+        demonstrated = self._demonstrations[demonstration][step].action
+        prepared = self._prepared[demonstration][step]
+        candidates = prepared.locate(query, progress, self._feasible)
+        best = candidates[0] if candidates else None
+        if best is None or best.probability < self._min_confidence:
+            raise NoConfidentMatch(best.probability if best else 0.0, self._min_confidence)
+        T = se3.orthonormal(best.T_query_support)
+        match = Match(
+            step, best.p_support, best.p_query, prepared.region, T, best.generator, best.probability
+        )
+        return Action(
+            se3.orthonormal(T @ demonstrated.T_world_gripper),
+            demonstrated.gripper_open,
+            demonstrated.allow_collisions,
+            best.probability,
+            match,
+            best.reachable,
+        )
 
 
-def _orthonormal(T: FloatArray) -> FloatArray:
-    """The pose with rounding errors of its rotation removed."""
-    U, _, Vh = np.linalg.svd(T[:3, :3])
-    clean = T.copy()
-    clean[:3, :3] = U @ Vh
-    return clean
+def _focused(scenes: Sequence[Scene], demonstration: Demonstration, focus: Focus) -> list[Scene]:
+    """The scenes, of which those until the gripper closes are focused on what is meant in the first."""
+    keyframes = demonstration.keyframes
+    closing = next((k for k, kf in enumerate(keyframes) if not kf.action.gripper_open), len(keyframes) - 1)
+    first = scenes[0]
+    meant = Focus(points=first.fused.points[in_focus(focus, first.observation, first.fused)])
+    return [
+        replace(scene, focus=in_focus(meant, scene.observation, scene.fused)) if k <= closing else scene
+        for k, scene in enumerate(scenes)
+    ]

@@ -7,7 +7,7 @@ repeated too often to be found again (a drawer's handle looks like the other dra
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -18,7 +18,7 @@ from imop.geometry.clusters import Objects, find_objects
 from imop.geometry.neighbours import nearest, within
 from imop.networks.region import trust
 from imop.policy.contacts import SAME, Contacts, find_contacts, leaving
-from imop.policy.matcher import Transition
+from imop.policy.interfaces import Transition
 from imop.types import BoolArray, FloatArray
 
 # Weight of a point of the region falls with its distance from the contact; scale in metres.
@@ -47,15 +47,12 @@ class Region:
             the region alone does not: the two ends of a box without its latch.
         spread: (M,) metres, how far the counterpart of each point is expected from it on another thing of
             the same kind, both seen from the action; None if nothing is known.
-        firm: whether its points are meant to move as one, so that one seen to be absent speaks against
-            a motion. A cluster may have joints and neighbours.
     """
 
     cloud: PointCloud
     weight: FloatArray
     p_gripper_held: FloatArray
     context: PointCloud | None = None
-    firm: bool = False
     spread: FloatArray | None = None
 
     @cached_property
@@ -73,17 +70,12 @@ class Region:
         """(M,) weights of a fit to another thing; see `networks.region.trust`."""
         return trust(self.spreads)
 
-    def colorless(self) -> "Region":
-        """The same region without its colours."""
-        context = None if self.context is None else self.context.colorless()
-        return replace(self, cloud=self.cloud.colorless(), context=context)
-
     def next_to(self, p: FloatArray, reach: float) -> "Region":
         """What of the region is nearer than `reach` (metres) to its point nearest to `p` (3,), alone."""
         points = self.cloud.points
         anchor = points[nearest(p[None], points)[1][0, 0]]
         near = np.linalg.norm(points - anchor, axis=1) < reach
-        return Region(self.cloud.select(near), self.weight[near], self.p_gripper_held, firm=self.firm)
+        return Region(self.cloud.select(near), self.weight[near], self.p_gripper_held)
 
 
 def find_regions(steps: Sequence[Transition]) -> list[Region]:
@@ -107,7 +99,9 @@ def find_region(steps: Sequence[Transition], k: int, objects: Objects, contacts:
         touched = p_held if len(p_held) else touched
     if held.all():
         held[:] = False
-    rest = Objects(objects.cloud.select(~held), objects.labels[~held], objects.height[~held])
+    kept = ~held & steps[k].before.focused(objects.cloud.points, SAME)
+    kept = kept if kept.any() else ~held
+    rest = Objects(objects.cloud.select(kept), objects.labels[kept], objects.height[kept])
     p_contact = se3.apply(T_contact, touched)
     distance, index = nearest(p_contact, rest.cloud.points)
     member = rest.labels == rest.labels[index[np.argmin(distance)]]

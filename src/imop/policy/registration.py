@@ -1,4 +1,8 @@
-"""The matcher without learning: descriptors, sampled motions, upright seeds, closest points."""
+"""The matcher without learned matches: regions by rules, point feature histograms, the same search.
+
+Of the networks only the verification is asked. What `learned` does better than this is what the region and
+matching networks are worth.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -6,36 +10,38 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from imop.geometry.cloud import PointCloud, farthest_points, voxel_downsample
-from imop.geometry.clusters import find_objects
 from imop.geometry.features import fpfh
-from imop.geometry.ransac import mutual_matches, sample_motions
-from imop.policy.inquiry import Inquiry
-from imop.policy.matcher import Hypothesis, Scene, Transition
+from imop.geometry.ransac import mutual_matches
+from imop.networks.verification import VerificationNetwork
+from imop.policy.interfaces import BEGINNING, Candidate, Feasible, PolicyConfig, Progress, Scene, Transition
+from imop.policy.proposals import Asked, Matches
 from imop.policy.region import Region, find_regions
-from imop.policy.search import Search, SearchConfig, upright_motions
-from imop.policy.things import Things, middle, without_held
+from imop.policy.search import StepSearch
+from imop.policy.target import without_held
+from imop.policy.verification import Verifier
 from imop.types import FloatArray
+
+# Points of the region, and of the scene, that are described.
+KEYPOINTS, SEEN = 800, 2500
 
 
 @dataclass(frozen=True)
 class RegistrationMatcher:
-    """Fast point feature histograms, sampled rigid motions and closest points, on clouds without labels.
+    """Fast point feature histograms on clouds without labels.
 
     Attributes:
+        verification: the network that says how likely candidates are right.
+        config: of the search.
         spacing: of the points that get descriptors, metres.
         radius: of a descriptor's neighbourhood, metres.
         color_weight: of colours in the comparison of descriptors.
-        turns: upright seeds for every object in the query, spread over a full turn.
-        search: how the motions are refined and judged.
-        seed: of the sampling.
     """
 
+    verification: VerificationNetwork
+    config: PolicyConfig = field(default_factory=PolicyConfig)
     spacing: float = 0.01
     radius: float = 0.05
     color_weight: float = 0.2
-    turns: int = 24
-    search: SearchConfig = field(default_factory=SearchConfig)
-    seed: int = 0
 
     def prepare(self, steps: Sequence[Transition]) -> list["RegisteredStep"]:
         """Find the regions of a demonstration and describe them."""
@@ -53,36 +59,30 @@ class RegistrationMatcher:
 
 
 class RegisteredStep:
-    """A demonstrated step prepared for registration."""
+    """A demonstrated step prepared for descriptors."""
 
     def __init__(self, matcher: RegistrationMatcher, step: Transition, region: Region) -> None:
-        self._matcher = matcher
-        self._region = region
-        self._search = Search(matcher.search, step.before, region)
-        self._keypoints, self._descriptors = matcher.describe(region.cloud, 800)
+        self._matcher, self._region = matcher, region
+        self._keypoints, self._described = matcher.describe(region.cloud, KEYPOINTS)
+        verifier = Verifier(matcher.verification)
+        self.search = StepSearch(matcher.config, step, region, None, verifier, self._ask)
 
     @property
     def region(self) -> FloatArray:
         """(M, 3) points of the region in the demonstrated scene."""
         return self._region.cloud.points
 
-    def match(self, query: Scene, hints: Sequence[FloatArray] = ()) -> tuple[Hypothesis, ...]:
-        """Where the region is in the query, best first; see `PreparedStep.match`."""
-        if len(query.cloud) < 5:
-            return ()
-        standing = without_held(find_objects(query.cloud, query.ground.plane).cloud, query, self._region)
-        if len(standing) < 5:
-            return ()
-        things = Things(query, standing)
-        upright = upright_motions(middle(self.region), things.places(), self._matcher.turns)
-        seeds = np.concatenate([self._sampled(standing), upright])
-        return Inquiry(self._search, things, hints).search(seeds)
+    def locate(
+        self, query: Scene, progress: Progress = BEGINNING, feasible: Feasible | None = None
+    ) -> tuple[Candidate, ...]:
+        """Where the region may be in the query, likeliest first; see `PreparedStep.locate`."""
+        return self.search.locate(query, progress, feasible)
 
-    def _sampled(self, things: PointCloud) -> FloatArray:
-        """(H, 4, 4) motions from matched descriptors."""
-        keypoints, descriptors = self._matcher.describe(things, 2500)
-        pairs = mutual_matches(self._descriptors, descriptors)
+    def _ask(self, query: Scene) -> Asked:
+        """Descriptors that choose each other."""
+        standing = without_held(query.cloud.select(~query.ground.bare), query, self._region)
+        keypoints, descriptors = self._matcher.describe(standing, SEEN)
+        pairs = mutual_matches(self._described, descriptors)
         x, y = self._keypoints.select(pairs.i_support), keypoints.select(pairs.i_query)
         assert x.normals is not None and y.normals is not None
-        seed = self._matcher.seed
-        return sample_motions(x.points, y.points, x.normals, y.normals, pairs.weight, seed=seed)
+        return Asked({}, Matches(x.points, x.normals, y.points, y.normals, pairs.weight))

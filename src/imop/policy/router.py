@@ -25,7 +25,7 @@ import torch
 from imop.networks.changes import change_graph, compared
 from imop.networks.model import Model
 from imop.networks.routing import Described, States, make_states
-from imop.policy.matcher import Scene, Transition
+from imop.policy.interfaces import Scene, Transition
 from imop.types import FloatArray
 
 

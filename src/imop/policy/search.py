@@ -1,116 +1,182 @@
-"""A region ready to be searched in any scene: what of it is compared, and how thoroughly."""
+"""One search in one scene: cheap generators first, until a candidate is likely enough."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from imop.geometry import se3
-from imop.geometry.cloud import farthest_points, inside_box
-from imop.geometry.clusters import connected
-from imop.geometry.neighbours import nearest
-from imop.policy.evidence import Template
-from imop.policy.matcher import Scene
+from imop.geometry.cloud import PointCloud, farthest_points
+from imop.geometry.icp import SMALLEST, upright
+from imop.policy.evidence import BESIDE, Template
+from imop.policy.interfaces import BEGINNING, Candidate, Feasible, PolicyConfig, Progress, Scene, Transition
+from imop.policy.proposals import Asked, equal_turns, half_turn, straightened, upright_motions
 from imop.policy.region import Region
-from imop.policy.symmetry import half_turn
-from imop.types import BoolArray, FloatArray
-
-# What is farther than this (metres) from where a region may be has nothing to say about it.
-BESIDE = 0.08
+from imop.policy.target import Target, around, middle, thing_of, without_held
+from imop.policy.verification import Part, Pool, Sought, Verifier
+from imop.types import FloatArray
 
 
-@dataclass(frozen=True)
-class SearchConfig:
-    """How thoroughly to search, and what is preferred among equally good explanations.
-
-    Attributes:
-        refined: how many seeds are refined by closest points.
-        judged: how many of the refined motions, those that look best at a glance, are judged.
-        finished: how many of the refined motions get the finest stage too.
-        righted: how many of the best are set upright, too.
-        turned: how many of the best are tried half a turn off, too: long things have two ends.
-        turn: share of its score that a hypothesis loses for half a turn off the demonstrated motion.
-        tilt: share that it loses for tilting things by `inquiry.TILTED` or more; twice for turning them over.
-        change: share that it loses for another pose than the demonstrated motion leads to, once begun.
-        sure: score from which a trusted motion needs no search.
-        opinion: what full support by the matcher's opinion adds to the score when motions are compared.
-    """
-
-    refined: int = 12
-    judged: int = 10
-    finished: int = 4
-    righted: int = 12
-    turned: int = 0
-    turn: float = 0.03
-    tilt: float = 0.35
-    change: float = 0.12
-    sure: float = 0.7
-    opinion: float = 0.1
-
-
-class Search:
-    """Searches the region of one demonstrated step in observed scenes.
+class StepSearch:
+    """A demonstrated step, searched in any number of scenes.
 
     Args:
-        config: how.
-        before: the demonstrated scene.
-        region: of the step, in that scene.
-        loose: whether the region is a thing of its own, whatever it touches.
+        config: how thoroughly.
+        step: the demonstrated one.
+        region: of it.
+        payload: what the hand takes next, if it is less than the region.
+        verifier: gives probabilities.
+        ask: the matcher's opinion of a scene; it is asked only if what was done before does not suffice.
     """
 
-    def __init__(self, config: SearchConfig, before: Scene, region: Region, loose: bool = False) -> None:
-        self.config, self.region = config, region
-        self.template = Template(region, tuple(before.observation.views.values()))
-        self.center = region.cloud.points.mean(axis=0)
-        self.T_world_gripper = before.observation.T_world_gripper
-        self.coarse = [region.cloud.points[farthest_points(region.cloud.points, 400)]]
+    def __init__(
+        self,
+        config: PolicyConfig,
+        step: Transition,
+        region: Region,
+        payload: PointCloud | None,
+        verifier: Verifier,
+        ask: Callable[[Scene], Asked],
+    ) -> None:
+        before, T_goal = step.before, step.action.T_world_gripper
+        views = tuple(before.observation.views.values())
+        standing = before.cloud.select(~before.ground.bare)
+        template = Template(region, T_goal[:3, 3], _beside(standing, T_goal, region), views)
+        parts = _parts(region, payload, T_goal[:3, 3], config)
+        turns = equal_turns(region.cloud)
+        self.sought, self._ask = Sought(config, step, region, template, parts, turns, verifier), ask
+        self._middles = [middle(region.cloud.points)]
         if region.context is not None:
-            # A thin part slides along itself; what it is fixed to holds it.
-            self.coarse.append(region.whole.points[farthest_points(region.whole.points, 600)])
-        self.fine = region.cloud.points[farthest_points(region.cloud.points, 1500)]
-        self.half_turn = half_turn(region.cloud.points if loose else self._thing(before))
+            self._middles.append(middle(region.whole.points))
+        self._half_turn = half_turn(thing_of(parts[0].coarse, standing.points))
+        # What is around the goal is evidence, too.
+        self._concerned = np.concatenate([region.whole.points, T_goal[None, :3, 3]])
 
-    def likely(self, query: Scene, hints: Sequence[FloatArray]) -> FloatArray:
-        """(H, 4, 4) motions to look at in any case: hints, none at all, and what the gripper has done."""
-        return np.stack([*hints, np.eye(4), self.repeated(query)])
+    def locate(
+        self, query: Scene, progress: Progress = BEGINNING, feasible: Feasible | None = None
+    ) -> tuple[Candidate, ...]:
+        """Where the region may be in the query, likeliest first; see `PreparedStep.locate`."""
+        ranked: tuple[Candidate, ...] = ()
+        for pool in self.pools(query, progress):
+            ranked = self._reachable_first(pool.ranked(), feasible)
+            best = ranked[0] if ranked else None
+            if best and best.reachable is not False and best.probability >= self.sought.config.enough:
+                break
+        return ranked
 
-    def repeated(self, query: Scene) -> FloatArray:
-        """(4, 4) the motion of the gripper since the demonstration."""
-        return query.observation.T_world_gripper @ se3.invert(self.T_world_gripper)
+    def _reachable_first(
+        self, ranked: tuple[Candidate, ...], feasible: Feasible | None
+    ) -> tuple[Candidate, ...]:
+        """The likeliest candidate that the arm can follow before all others."""
+        if feasible is None or not ranked:
+            return ranked
+        for i, candidate in enumerate(ranked):
+            if feasible(se3.orthonormal(candidate.T_query_support @ self.sought.T_goal)):
+                return (replace(candidate, reachable=True), *ranked[:i], *ranked[i + 1 :])
+        return (replace(ranked[0], reachable=False), *ranked[1:])
 
-    def around(self, points: FloatArray, motions: FloatArray) -> BoolArray:
-        """(N,) which points (N, 3) have to do with the region after any of the motions (H, 4, 4)."""
-        return around(points, self.region.whole.points, motions)
+    def pools(self, query: Scene, progress: Progress) -> Iterator[Pool]:
+        """The candidates after each stage, cheap ones first; every pool holds those before it."""
+        if len(query.fused) < SMALLEST:
+            return
+        before, T_last = self.sought.step.before, progress.T_last
+        T_repeated = query.observation.T_world_gripper @ se3.invert(before.observation.T_world_gripper)
+        if T_last is not None:
+            near = query.fused.select(~query.ground.bare)
+            near = near.select(around(near.points, self._concerned, np.stack([T_last, T_repeated])))
+            near = without_held(near, query, self.sought.region)
+            if len(near) >= SMALLEST:
+                pool = Pool(self.sought, Target(query, near), T_last, T_repeated, None)
+                self._followed(pool)
+                yield pool
+        standing = without_held(query.cloud.select(~query.ground.bare), query, self.sought.region)
+        if len(standing) < SMALLEST:
+            return
+        pool = Pool(self.sought, Target(query, standing), T_last, T_repeated, self._ask(query))
+        self._followed(pool)
+        for generate in (self._fitted, self._searched, self._anywhere):
+            generate(pool)
+            yield pool
 
-    def _thing(self, before: Scene) -> FloatArray:
-        """(N, 3) the thing in the demonstrated scene that the region is part of."""
-        points = before.cloud.points[~before.ground.bare]
-        if not len(points):
-            return self.region.cloud.points
-        labels = connected(points)
-        part_of = labels[nearest(self.coarse[0], points)[1][:, 0]]
-        thing: FloatArray = points[labels == np.bincount(part_of).argmax()]
-        return thing
+    def _followed(self, pool: Pool) -> None:
+        """What was done before goes on."""
+        for name, T in (("hint", pool.T_last), ("gripper", pool.T_repeated)):
+            if T is not None:
+                pool.add(name, [T, pool.finished(self.sought.parts[0], T)])
+
+    def _fitted(self, pool: Pool) -> None:
+        """What most matches agree on."""
+        assert pool.asked is not None
+        for name, T in pool.asked.fits.items():
+            pool.add(name, [pool.moved(part, T) for part in self.sought.parts[:2]])
+        self._turned(pool)
+
+    def _searched(self, pool: Pool) -> None:
+        """What some matches agree on, for each part of the region."""
+        assert pool.asked is not None
+        config = self.sought.config
+        for part in self.sought.parts:
+            matches = pool.asked.matches.of(part.fine)
+            if part.name != "firm":
+                middles = self._middles if part.name == "region" else [middle(part.fine)]
+                upright_on = matches.upright(pool.target, config.places, config.turns, middles)
+                seeds = [matches.motions(config.samples), upright_on]
+                pool.search(part, np.concatenate(seeds))
+        self._turned(pool)
+
+    def _anywhere(self, pool: Pool) -> None:
+        """Every thing, in every turn: the matches may be of a wrong one."""
+        config = self.sought.config
+        places = pool.target.places(config.fewest)
+        if len(places):
+            for part in self.sought.parts:
+                if part.name != "firm":
+                    seeds = upright_motions(middle(part.fine), places, config.turns)
+                    pool.search(part, seeds, "anywhere")
+            self._turned(pool)
+
+    def _turned(self, pool: Pool) -> None:
+        """The best so far laid down exactly, in turns that look alike, straight, and upright."""
+        whole, center = self.sought.parts[0], self.sought.center
+        found: dict[str, list[FloatArray]] = {"half_turn": [], "straight": [], "upright": [], "exact": []}
+        best = pool.best(self.sought.config.tried)
+        # Which turn of a round thing is meant, its marks may say, or the arm, which cannot reach them all.
+        found["turn"] = [pool.moved(whole, T @ S) for T in best[:1] for S in self.sought.turns[1:]]
+        for T in best:
+            found["exact"].append(pool.finished(whole, T))
+            found["upright"].append(upright(T, center))
+            straight = straightened(T, pool.T_repeated, center)
+            for name, other in (("half_turn", T @ self._half_turn), ("straight", straight)):
+                moved = pool.moved(whole, other)
+                found[name] += [moved, upright(moved, center)]
+        for name, motions in found.items():
+            pool.add(name, motions)
 
 
-def around(points: FloatArray, thing: FloatArray, motions: FloatArray) -> BoolArray:
-    """(N,) which points (N, 3) have to do with a thing (M, 3) after any of the motions (H, 4, 4)."""
-    corners = np.stack(np.meshgrid(*np.stack([thing.min(axis=0), thing.max(axis=0)]).T), axis=-1)
-    reached = np.zeros(len(points), dtype=bool)
-    for box in se3.apply(motions, corners.reshape(-1, 3)):
-        reached |= inside_box(points, box.min(axis=0) - BESIDE, box.max(axis=0) + BESIDE)
-    return reached
+def _parts(
+    region: Region, payload: PointCloud | None, p_goal: FloatArray, config: PolicyConfig
+) -> tuple[Part, ...]:
+    """The region itself, what of it stays in place, what is next to the gripper, and what it takes."""
+    points = region.cloud.points
+    rng = np.random.default_rng(0)
+    share = region.trust / region.trust.sum()
+    drawn = rng.choice(len(points), min(1000, 4 * len(points)), p=share)
+    parts = [_part("region", 0, points), Part("firm", 3, points[drawn[:250]], points[drawn])]
+    near = region.next_to(p_goal, config.next_to).cloud.points
+    if SMALLEST <= len(near) < 0.8 * len(points):
+        parts.append(_part("part", 2, near))
+    if payload is not None:
+        parts.append(_part("payload", 2, payload.points))
+    return tuple(parts)
 
 
-def straightened(T: FloatArray, T_straight: FloatArray, p: FloatArray) -> FloatArray:
-    """(4, 4) the motion `T_straight`, carried on to where `T` takes a point (3,)."""
-    carried = T_straight.copy()
-    carried[:3, 3] += (se3.apply(T, p[None]) - se3.apply(T_straight, p[None]))[0]
-    return carried
+def _part(name: str, column: int, points: FloatArray) -> Part:
+    coarse, fine = farthest_points(points, 250), farthest_points(points, 1000)
+    return Part(name, column, points[coarse], points[fine])
 
 
-def upright_motions(center: FloatArray, places: FloatArray, turns: int) -> FloatArray:
-    """(P * turns, 4, 4) motions that carry `center` (3,) to places (P, 3), in all upright turns."""
-    yaw = np.linspace(0.0, 2 * np.pi, turns, endpoint=False)
-    R = np.tile(np.stack([se3.euler(z=float(angle)) for angle in yaw]), (len(places), 1, 1))
-    return se3.make(R, np.repeat(places, turns, axis=0) - R @ center)
+def _beside(standing: PointCloud, T_goal: FloatArray, region: Region) -> PointCloud:
+    """What stands around the place that the tip goes to; the region if nothing does."""
+    near = np.linalg.norm(standing.points - T_goal[:3, 3], axis=1) < BESIDE
+    cloud = standing.select(near) if near.any() else region.cloud
+    return cloud.select(farthest_points(cloud.points, 150))

@@ -16,15 +16,15 @@ import tyro
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from imop.candidates.matchers import DescribedMatcher, VerifiedMatcher
-from imop.candidates.pool import Pool
-from imop.candidates.verification import beside_rivals
 from imop.files import replaced
 from imop.geometry import se3
 from imop.geometry.accuracy import COARSE
 from imop.geometry.perception import Perception
 from imop.networks.model import BUNDLED, Model, load_model
-from imop.policy.matcher import Scene, Transition
+from imop.policy.interfaces import BEGINNING, Progress, Scene, Transition
+from imop.policy.learned import LearnedMatcher
+from imop.policy.registration import RegistrationMatcher
+from imop.policy.verification import Pool, beside_rivals
 from imop.robots.panda import panda_self_filter
 from imop.training.families import TRAINING
 from imop.training.families.thing import Family
@@ -39,7 +39,7 @@ AFRESH = 0.3
 ANSWERED = 0.7
 # How far the motion that was found for the step before may be off, metres and radians.
 HINT_OFF = (0.003, 0.03)
-# Share of the cases that the search without learned matches gives.
+# Share of the cases that the search with descriptors instead of networks gives.
 REGISTERED = 0.15
 _PER_FILE = 20
 
@@ -66,7 +66,7 @@ def make_cases(
     rng = np.random.default_rng((seed, 7))
     found: list[list[tuple[Float32Array, BoolArray]]] = []
     perception = Perception(panda_self_filter().is_robot)
-    matchers = VerifiedMatcher(model), DescribedMatcher(model)
+    matchers = LearnedMatcher(model), RegistrationMatcher(model.verification)
     streams = {v: synthetic_scenes(families, v, seed) for v in shares(mix)}
     while len(found) < count:
         variation = rng.choice(list(streams), p=list(shares(mix).values()))
@@ -75,11 +75,11 @@ def make_cases(
             prepared = matcher.prepare(_transitions(group[0].shown, perception))
             answers: dict[int, FloatArray] = {}
             for example in group:
-                hints = _hints(example, group, answers, rng)
+                progress = _progress(example, group, answers, rng)
                 observation = example.asked.observations[example.step]
                 query = Scene(observation, perception.points(observation))
                 stages = []
-                for pool in prepared[example.step].search.pools(query, hints):
+                for pool in prepared[example.step].search.pools(query, progress):
                     if pool.motions:
                         stages.append(_judged(pool, example))
                         answers[example.step] = pool.best(1)[0]
@@ -103,25 +103,25 @@ def _transitions(take: Take, perception: Perception) -> list[Transition]:
     ]
 
 
-def _hints(
+def _progress(
     example: Example, group: Sequence[Example], answers: Mapping[int, FloatArray], rng: np.random.Generator
-) -> list[FloatArray]:
+) -> Progress:
     """What was done before: what the search answered then, right or wrong, or about what was right.
 
     Nothing for the first step, and for some others.
     """
     before = next((e for e in group if e.step == example.step - 1), None)
     if before is None or rng.random() < AFRESH:
-        return []
+        return BEGINNING
     if before.step in answers and rng.random() < ANSWERED:
-        return [answers[before.step]]
+        return Progress(answers[before.step])
     distance, angle = HINT_OFF
     right = before.pair.T_query_support
     T = right[int(rng.integers(len(right)))]
     p = se3.apply(T, example.pair.T_world_goal[None, :3, 3])[0]
     R = se3.euler(*rng.normal(0, angle / 2, 3))
     off = se3.make(R, p - R @ p + rng.normal(0, distance, 3))
-    return [off @ T]
+    return Progress(off @ T)
 
 
 def _judged(pool: Pool, example: Example) -> tuple[Float32Array, BoolArray]:

@@ -1,77 +1,64 @@
-"""Candidates of one step in one scene: refined, judged by evidence, and ranked by their probability."""
+"""Candidates of one step in one scene: refined, verified by evidence, and ranked by their probability.
+
+The evidence of each candidate is set beside that of its rivals; the verification network, which learned what
+that is worth, makes a probability of it (`networks/verification.py`).
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import torch
 
-from imop.candidates.evidence import Surface, Template, glance, shares
-from imop.candidates.verification import Verifier
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud
 from imop.geometry.icp import CLOSE, FINEST
 from imop.geometry.ransac import distinct
-from imop.policy.matcher import Hypothesis, Scene, Transition
-from imop.policy.matches import Matches
+from imop.networks.verification import EVIDENCE, RIVALRY, VerificationNetwork
+from imop.policy.evidence import Template, glance, shares
+from imop.policy.interfaces import Candidate, PolicyConfig, Transition
+from imop.policy.proposals import Asked, Matches
 from imop.policy.region import Region
-from imop.policy.things import Standing
-from imop.types import FloatArray
+from imop.policy.target import Target
+from imop.types import BoolArray, FloatArray
+
+# Candidates that take the gripper farther apart than this, metres and radians, are rivals.
+ELSEWHERE = (0.02, 0.26)
+# A point of the region is in focus if a point in focus is this near to it, metres.
+IN_FOCUS = 0.02
 
 
-@dataclass(frozen=True)
-class PolicyConfig:
-    """All that is set by hand in the policy beside the constants of geometry.
+class Verifier:
+    """Probabilities of candidates, all of one step in one scene."""
 
-    Attributes:
-        enough: probability of a candidate from which no further generator is asked.
-        threshold: least probability of a region point.
-        refined: seeds of one part of the region that are refined by closest points.
-        judged: refined motions of one stage that are judged.
-        tried: how many of the best are also tried in their half turn, straight, and upright.
-        candidates: query points per region point that may be matched.
-        tight, loose: matches nearer than this to where a motion carries them speak for it, metres.
-        next_to: what of the region is this near to where the gripper goes is a part of its own, metres.
-        same_motion: motions nearer to each other than this, metres and radians, are judged once.
-        fewest: a thing of fewer points is none.
-    """
+    def __init__(self, network: VerificationNetwork) -> None:
+        self._network = network
 
-    enough: float = 0.9
-    threshold: float = 0.5
-    refined: int = 8
-    judged: int = 12
-    tried: int = 3
-    candidates: int = 2
-    tight: float = 0.015
-    loose: float = 0.03
-    next_to: float = 0.05
-    same_motion: tuple[float, float] = (0.002, 0.02)
-    fewest: int = 30
+    def __call__(self, evidence: FloatArray, goals: FloatArray) -> FloatArray:
+        """(H,) probabilities of being right.
+
+        Args:
+            evidence: (H, |EVIDENCE|).
+            goals: (H, 4, 4) where the candidates take the gripper.
+        """
+        inputs = torch.from_numpy(beside_rivals(evidence, goals).astype(np.float32))
+        return np.asarray(self._network.probability(inputs).double().numpy())
 
 
-class Target(Standing):
-    """What of an observed scene the region may be, prepared once.
+def beside_rivals(evidence: FloatArray, goals: FloatArray) -> FloatArray:
+    """(H, INPUTS) the evidence, and how much of it candidates have more than the best and the best rival."""
+    column = {name: evidence[:, k] for k, name in enumerate(EVIDENCE)}
+    column["alike"] = column["firm_loose"] * column["firm_color"]
+    column["clear"] = 1 - (column["region_clash"] + column["backward_clash"]) / 2
+    compared = np.stack([column[name] for name in RIVALRY], axis=1)
+    elsewhere = rivals(goals)
+    other = np.where(elsewhere[:, :, None], compared[None], 0.0).max(axis=1)
+    return np.concatenate([evidence, compared - compared.max(axis=0), compared - other], axis=1)
 
-    Attributes:
-        surface: the points as evidence.
-    """
 
-    def __init__(self, query: Scene, cloud: PointCloud) -> None:
-        super().__init__(query, cloud)
-        self.surface = Surface(self.cloud, tuple(query.observation.views.values()))
-
-
-@dataclass(frozen=True, eq=False)
-class Asked:
-    """What a matcher says about one scene.
-
-    Attributes:
-        fits: generator -> (4, 4) motion that it proposes before all others.
-        matches: pairs of points.
-    """
-
-    fits: dict[str, FloatArray]
-    matches: Matches
+def rivals(goals: FloatArray) -> BoolArray:
+    """(H, H) True where two poses (H, 4, 4) of the gripper are not about the same."""
+    return ~se3.near(goals[:, None], goals[None], *ELSEWHERE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,17 +111,25 @@ class Sought:
 
 
 class Pool:
-    """Candidates of one step in one scene."""
+    """Candidates of one step in one scene.
+
+    Args:
+        sought: the step.
+        target: what of the scene the region may be.
+        T_last: (4, 4) the motion of the step before, if there was one.
+        T_repeated: (4, 4) what the gripper has done since the demonstration.
+        asked: what the matcher says, once it is asked.
+    """
 
     def __init__(
         self,
         sought: Sought,
         target: Target,
-        hints: Sequence[FloatArray],
+        T_last: FloatArray | None,
         T_repeated: FloatArray,
         asked: Asked | None,
     ) -> None:
-        self._sought, self.target, self.hints = sought, target, hints
+        self._sought, self.target, self.T_last = sought, target, T_last
         self.T_repeated, self.asked = T_repeated, asked
         self.motions: list[FloatArray] = []
         self.generators: list[str] = []
@@ -164,9 +159,11 @@ class Pool:
     def add(self, name: str, motions: Sequence[FloatArray]) -> None:
         """Judge motions that differ from all before; the most promising ones, if there are too many."""
         sought = self._sought
-        if not motions:
+        new = np.stack(motions) if motions else np.zeros((0, 4, 4))
+        if len(new) and self.target.query.focus is not None:
+            new = self._in_focus(new)
+        if not len(new):
             return
-        new = np.stack(motions)
         looks = glance(sought.template, self.target.surface, new).max(axis=1)
         new = new[np.argsort(-looks, kind="stable")]
         every = np.concatenate([np.stack(self.motions), new]) if self.motions else new
@@ -178,6 +175,14 @@ class Pool:
             self._rows.append(self._evidence(added))
             self.motions += list(added)
             self.generators += [name] * len(added)
+
+    def _in_focus(self, T: FloatArray) -> FloatArray:
+        """Those of motions (H, 4, 4) that act on what is meant."""
+        template = self._sought.template
+        near, which = template.weights[: template.size, 1], np.arange(template.size)
+        inside = self.target.query.focused(template.moved(T, which)[0], IN_FOCUS)
+        share = inside.reshape(len(T), -1) @ near / near.sum()
+        return np.asarray(T[share >= self._sought.config.focused])
 
     def evidence(self) -> FloatArray:
         """(H, |EVIDENCE|) of all candidates."""
@@ -192,20 +197,24 @@ class Pool:
         return self._sought.verifier(self.evidence(), self.goals())
 
     def best(self, count: int) -> list[FloatArray]:
-        """The likeliest motions so far, distinct."""
+        """The likeliest motions so far, distinct; fewer than `count` if there are fewer."""
+        if not self.motions:
+            return []
         order = np.argsort(-self.probabilities(), kind="stable")
         motions = np.stack(self.motions)[order]
         return [motions[i] for i in distinct(motions, self._sought.center, count)]
 
-    def ranked(self) -> tuple[Hypothesis, ...]:
+    def ranked(self) -> tuple[Candidate, ...]:
         """All candidates, likeliest first, without those that are about the same as a likelier one."""
+        if not self.motions:
+            return ()
         p = self.probabilities()
         order = np.argsort(-p, kind="stable")
         motions = np.stack(self.motions)[order]
         kept = distinct(motions, self._sought.center, len(motions))
         return tuple(self._candidate(int(order[i]), float(p[order[i]])) for i in kept)
 
-    def _candidate(self, i: int, probability: float) -> Hypothesis:
+    def _candidate(self, i: int, probability: float) -> Candidate:
         template, T = self._sought.template, self.motions[i]
         which = np.arange(template.size)
         points, normals = template.moved(T[None], which)
@@ -213,7 +222,7 @@ class Pool:
         good = np.flatnonzero(found.loose > 0.3)
         p_query = self.target.cloud.points[found.index[good]]
         p_support = template.cloud.points[good]
-        return Hypothesis(T, probability, p_support, p_query, self.generators[i], probability)
+        return Candidate(T, probability, p_support, p_query, self.generators[i])
 
     def _evidence(self, T: FloatArray) -> FloatArray:
         """(H, |EVIDENCE|) of motions (H, 4, 4); in the order of `networks.verification.EVIDENCE`."""
@@ -242,17 +251,16 @@ class Pool:
         T_goal, center = self._sought.T_goal, self._sought.center
         tilt = np.arccos(np.clip(T[:, 2, 2], -1.0, 1.0))
         rise = 10 * (se3.apply(T, center[None])[:, 0, 2] - center[2])
-        columns = [tilt, rise, np.full(len(T), float(bool(len(self.hints))))]
-        for known in (self.hints[-1:], (self.T_repeated,)):
+        columns = [tilt, rise, np.full(len(T), float(self.T_last is not None))]
+        for known in (self.T_last, self.T_repeated):
             goals = T @ T_goal
-            other = known[0] @ T_goal if known else None
-            away = np.zeros(len(T)) if other is None else se3.translation_distance(goals, other)
-            turn = np.zeros(len(T)) if other is None else se3.rotation_distance(goals, other)
+            other = goals if known is None else known @ T_goal
+            away, turn = se3.translation_distance(goals, other), se3.rotation_distance(goals, other)
             columns += [np.log1p(away / 0.01), turn]
         return np.stack(columns, axis=1)
 
     def _situation(self, count: int) -> FloatArray:
-        """(count, 9) what is the same for all candidates: the hand, and what kind of region it is."""
+        """(count, 10) what is the same for all candidates: the hand, and what kind of region it is."""
         sought, step = self._sought, self._sought.step
         region, spread, w = sought.region, sought.template.spread, sought.template.weights
         size = np.ptp(region.cloud.points, axis=0).max()
@@ -266,5 +274,6 @@ class Pool:
             region.weight.mean(),
             *(100 * np.average(spread, weights=w[:, k] + 1e-9) for k in (0, 1)),
             np.log(len(sought.turns)),
+            sought.template.marks,
         ]
         return np.tile(np.array(values, dtype=np.float64), (count, 1))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from imop.geometry.cloud import PointCloud
-from imop.policy.matcher import Scene
+from imop.policy.interfaces import Scene
 from tests.policy.scenes import RED, above, at, box, scene
 
 HOME = above(0.2, 0.1, 1.0)

@@ -6,11 +6,11 @@ import numpy as np
 
 from imop.geometry import se3
 from imop.geometry.cloud import concatenate
-from imop.policy.evidence import Surface
 from imop.policy.region import Region
-from imop.policy.things import Things, middle, without_held
-from tests.policy.scenes import BLUE, GREY, RED, TABLE, above, at, box, moved, scene
+from imop.policy.target import Target, middle, thing_of, without_held
+from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, scene
 
+SIZE = (0.1, 0.05, 0.06)
 HOME = above(0.2, 0.1, 1.0)
 CUBE = (0.04, 0.04, 0.04)
 
@@ -18,11 +18,11 @@ CUBE = (0.04, 0.04, 0.04)
 def test_every_thing_has_its_place_and_small_ones_can_be_left_out():
     cubes = [box(CUBE, RED, at(x, 0.1), seed=k) for k, x in enumerate((0.0, 0.2))]
     crumb = box((0.01, 0.01, 0.01), BLUE, at(0.4, 0.1))
-    things = Things(scene([], HOME), concatenate([*cubes, crumb]))
-    assert len(things.places()) == 3
-    places = things.places(len(crumb) + 1)
+    target = Target(scene([], HOME), concatenate([*cubes, crumb]))
+    assert len(target.places()) == 3
+    places = target.places(len(crumb) + 1)
     np.testing.assert_allclose(places[places[:, 0].argsort(), 0], (0.0, 0.2), atol=0.003)
-    assert len(things.places(10**6)) == 0
+    assert len(target.places(10**6)) == 0
 
 
 def test_the_middle_does_not_depend_on_how_much_of_a_side_was_seen():
@@ -41,36 +41,18 @@ def test_what_is_in_the_hand_is_left_out_unless_it_is_the_region():
     assert without_held(query.cloud, query, Region(held, np.ones(len(held)), p_held[:0])) is query.cloud
 
 
-def test_what_lies_on_a_surface_and_differs_from_it_is_left():
-    chest, note = box((0.2, 0.2, 0.1), GREY, at(0.1, 0.1)), box((0.08, 0.04, 0.01), RED, at(0.05, 0.12, 0.85))
-    things = Things(scene([], HOME), concatenate([chest, note]))
-    T = at(0.3, -0.2, 0.0, yaw=0.5)
-    surface = Surface(moved(chest, se3.invert(T)), ())
-    left = things.unexplained(surface, T)
-    assert left is not None
-    red = left.cloud.colors[:, 0] > 0.7
-    assert red.sum() > 0.9 * len(note) and (~red).sum() < 0.02 * len(chest)
-    np.testing.assert_allclose(left.places(len(note) // 2)[0], middle(note.points), atol=0.005)
-
-
-def test_a_surface_that_explains_everything_leaves_nothing():
-    chest = box((0.2, 0.2, 0.1), GREY, at(0.1, 0.1))
-    assert Things(scene([], HOME), chest).unexplained(Surface(chest, ()), np.eye(4)) is None
-
-
-def test_colours_are_found_again_and_can_be_left_out():
-    red, blue = box(CUBE, RED, at(0.1, 0.1)), box(CUBE, BLUE, at(0.3, 0.1))
-    things = Things(scene([], HOME), concatenate([red, blue]))
-    assert things.colored_like(blue).tolist() == [False] * len(red) + [True] * len(blue)
-    assert not things.colored_like(blue.select(np.arange(0))).any()
-    assert things.colorless().colored_like(red.colorless()).all()
-
-
-def test_things_without_normals_get_them_from_their_own_points():
+def test_target_without_normals_get_them_from_their_own_points():
     cube = box((0.08, 0.08, 0.08), RED, at(0.1, 0.1), spacing=0.003)
-    found = Things(scene([], HOME), replace(cube, normals=None)).cloud
+    found = Target(scene([], HOME), replace(cube, normals=None)).cloud
     np.testing.assert_array_equal(found.points, cube.points)
     # Those of the sides may point either way for a camera straight above.
     assert np.quantile(np.abs(np.einsum("ij,ij->i", found.normals, cube.normals)), 0.2) > 0.99
     assert np.all(np.einsum("ij,ij->i", found.normals, np.array([0, 0, 2]) - found.points) >= 0)
-    assert Things(scene([], HOME), cube).cloud is cube
+    assert Target(scene([], HOME), cube).cloud is cube
+
+
+def test_the_thing_of_a_part_is_all_that_is_connected_to_it():
+    one, other = box(SIZE, RED, at(0.1, 0.1)), box(SIZE, BLUE, at(0.4, 0.1))
+    standing = concatenate([one, other]).points
+    assert len(thing_of(one.points[:20], standing)) == len(one)
+    assert thing_of(one.points, standing[:0]) is one.points
