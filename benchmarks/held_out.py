@@ -20,8 +20,6 @@ from pathlib import Path
 import numpy as np
 import torch
 import tyro
-from imop.policy.matcher import Matcher, Transition
-from imop.policy.matcher import Scene as Seen
 from joblib import Parallel, delayed
 from rich.console import Console
 from rich.table import Table
@@ -34,6 +32,8 @@ from imop.geometry.cloud import PointCloud
 from imop.geometry.neighbours import within
 from imop.geometry.perception import Perception
 from imop.networks.model import BUNDLED, load_model
+from imop.policy.interfaces import BEGINNING, Matcher, Progress, Transition
+from imop.policy.interfaces import Scene as Seen
 from imop.policy.learned import LearnedMatcher
 from imop.policy.registration import RegistrationMatcher
 from imop.robots.panda import panda_self_filter
@@ -85,8 +85,9 @@ class Row:
 def make_matcher(method: str, weights: Path) -> Matcher:
     if method == "textbook":
         return TextbookMatcher()
-    model = load_model(weights)
-    return LearnedMatcher(model) if method == "learned" else RegistrationMatcher(model.verification)
+    if method == "registration":
+        return RegistrationMatcher.from_pretrained(weights)
+    return LearnedMatcher(load_model(weights))
 
 
 def observe(scene: Scene, rng: np.random.Generator) -> tuple[Take, list[Observation]]:

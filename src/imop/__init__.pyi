@@ -1,6 +1,7 @@
 from .demos.load import load_demonstrations
 from .demos.store import DemonstrationStore
 from .errors import ImopError, InvalidInput, NoConfidentMatch, PlanFailed
+from .geometry.focus import Focus
 from .geometry.perception import Perception
 from .policy.learned import LearnedMatcher
 from .policy.one_shot import OneShotPolicy
@@ -19,6 +20,7 @@ __all__ = [
     "CameraView",
     "Demonstration",
     "DemonstrationStore",
+    "Focus",
     "ImopError",
     "InvalidInput",
     "Keyframe",

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from imop.policy.interfaces import Candidate
 
 from imop.evaluation.appearance import Appearance
 from imop.evaluation.open_loop import Case, ToldRouter, ask, region_iou
@@ -16,6 +15,7 @@ from imop.geometry import cloud as clouds
 from imop.geometry import se3
 from imop.geometry.accuracy import COARSE, FINE
 from imop.geometry.perception import Perception
+from imop.policy.interfaces import Candidate
 from imop.policy.one_shot import OneShotPolicy
 from imop.tasks.env import make_task
 from imop.tasks.expert import record_demonstration

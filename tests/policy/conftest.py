@@ -3,7 +3,6 @@
 import pytest
 
 from imop.geometry.perception import Perception
-from imop.networks.model import load_model
 from imop.policy.one_shot import OneShotPolicy
 from imop.policy.registration import RegistrationMatcher
 from imop.robots.panda import panda_self_filter
@@ -32,7 +31,7 @@ def wanted():
 
 @pytest.fixture(scope="session")
 def _watched(perception, shown):
-    policy = OneShotPolicy(RegistrationMatcher(load_model().verification), perception)
+    policy = OneShotPolicy(RegistrationMatcher.from_pretrained(), perception)
     policy.watch(shown.stripped())
     return policy
 

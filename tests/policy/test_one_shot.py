@@ -10,14 +10,10 @@ from imop.errors import CorruptData, ImopError, InvalidInput, NoConfidentMatch
 from imop.geometry import se3
 from imop.geometry.focus import Focus
 from imop.geometry.view_alignment import corrected, find_errors
-from imop.networks.model import Model, ModelConfig, load_model, save_model
+from imop.networks.model import Model, ModelConfig, save_model
 from imop.policy.one_shot import OneShotPolicy
 from imop.policy.registration import RegistrationMatcher
 from imop.policy.router import AdvancingRouter, LearnedRouter
-
-
-def registration():
-    return RegistrationMatcher(load_model().verification)
 
 
 def with_depth(observation, depth):
@@ -66,7 +62,7 @@ def test_cameras_with_wrong_poses_are_corrected_alike_in_demonstration_and_test(
         for name in shown.final.views
     }
     steps = [replace(k, observation=corrected(k.observation, wrong)) for k in shown.keyframes]
-    policy = OneShotPolicy(registration(), perception)
+    policy = OneShotPolicy(RegistrationMatcher.from_pretrained(), perception)
     policy.watch(replace(shown, keyframes=tuple(steps), final=corrected(shown.final, wrong)).stripped())
     action = policy.act(corrected(wanted.keyframes[0].observation, wrong).stripped())
     expert = wanted.keyframes[0].action.T_world_gripper
@@ -81,7 +77,7 @@ def test_matched_points_lie_in_the_scene_and_move_rigidly(policy, shown, wanted)
 
 
 def test_privileged_information_changes_nothing(perception, policy, shown, wanted):
-    informed = OneShotPolicy(registration(), perception)
+    informed = OneShotPolicy(RegistrationMatcher.from_pretrained(), perception)
     informed.watch(replace(shown, task="another/name", instructions=("something else",), variation=7))
     for keyframe in wanted.keyframes[:2]:
         seen = keyframe.observation
@@ -104,7 +100,10 @@ def test_what_the_arm_cannot_reach_gives_way_to_what_is_about_as_right(perceptio
         return len(asked) > 1
 
     observation = wanted.keyframes[0].observation
-    free, bound = (OneShotPolicy(registration(), perception, feasible=f) for f in (None, not_the_first))
+    free, bound = (
+        OneShotPolicy(RegistrationMatcher.from_pretrained(), perception, feasible=f)
+        for f in (None, not_the_first)
+    )
     for policy in (free, bound):
         policy.watch(shown)
     first, second = free.act(observation), bound.act(observation)
@@ -117,7 +116,7 @@ def test_what_the_arm_cannot_reach_gives_way_to_what_is_about_as_right(perceptio
 
 def test_if_nothing_can_be_reached_the_best_is_given_and_that_is_said(perception, policy, shown, wanted):
     observation = wanted.keyframes[0].observation
-    bound = OneShotPolicy(registration(), perception, feasible=lambda T: False)
+    bound = OneShotPolicy(RegistrationMatcher.from_pretrained(), perception, feasible=lambda T: False)
     bound.watch(shown)
     policy.reset()
     free, stuck = policy.act(observation), bound.act(observation)
@@ -152,7 +151,7 @@ def test_what_is_out_of_focus_is_not_acted_on(policy, wanted):
 
 
 def test_an_empty_table_is_no_confident_match(perception, shown, wanted):
-    strict = OneShotPolicy(registration(), perception, min_confidence=0.5)
+    strict = OneShotPolicy(RegistrationMatcher.from_pretrained(), perception, min_confidence=0.5)
     strict.watch(shown)
     seen = wanted.keyframes[0].observation
     views = {
@@ -173,7 +172,7 @@ def _things(observation):
 
 def test_nothing_watched(perception, wanted):
     with pytest.raises(InvalidInput) as error:
-        OneShotPolicy(registration(), perception).act(wanted.keyframes[0].observation)
+        OneShotPolicy(RegistrationMatcher.from_pretrained(), perception).act(wanted.keyframes[0].observation)
     assert error.value.field == "demonstration"
 
 

@@ -5,7 +5,6 @@ import numpy as np
 from imop.demos.rlbench import read_episode
 from imop.evaluation.predict import predict
 from imop.geometry import se3
-from imop.networks.model import load_model
 from imop.policy.interfaces import Progress
 from imop.policy.one_shot import OneShotPolicy
 from imop.policy.registration import RegistrationMatcher
@@ -18,7 +17,7 @@ SIZE = (0.1, 0.05, 0.06)
 
 def prepared():
     scenes = [scene([box(SIZE, RED, at(0.1, 0.1))], T) for T in (HOME, GRASP)]
-    return RegistrationMatcher(load_model().verification).prepare(transitions(scenes, [(GRASP, False)]))[0]
+    return RegistrationMatcher.from_pretrained().prepare(transitions(scenes, [(GRASP, False)]))[0]
 
 
 def test_the_box_of_the_same_colour_is_found():
@@ -67,7 +66,7 @@ def test_a_query_without_points_gives_no_candidate():
 
 def test_real_demonstrations(perception, rlbench_demos):
     episodes = rlbench_demos / "open_drawer" / "all_variations" / "episodes"
-    policy = OneShotPolicy(RegistrationMatcher(load_model().verification), perception)
+    policy = OneShotPolicy(RegistrationMatcher.from_pretrained(), perception)
     policy.watch(read_episode(episodes / "episode5").stripped())
     predictions = predict(policy, read_episode(episodes / "episode3"))
     assert [p.within_1cm_5deg for p in predictions] == [True, True, True]

@@ -12,7 +12,7 @@ from imop.evaluation.replay import ReplayPolicy
 from imop.evaluation.robots import PANDA, robot_functions
 from imop.evaluation.textbook import TextbookMatcher
 from imop.geometry.perception import Perception
-from imop.networks.model import BUNDLED, load_model
+from imop.networks.model import BUNDLED
 from imop.policy.interfaces import Matcher
 from imop.policy.one_shot import OneShotPolicy
 from imop.policy.registration import RegistrationMatcher
@@ -68,7 +68,7 @@ def make_policy(
     if method in ("registration", "textbook"):
         matcher: Matcher = TextbookMatcher()
         if method == "registration":
-            matcher = RegistrationMatcher(load_model(weights or BUNDLED).verification)
+            matcher = RegistrationMatcher.from_pretrained(weights or BUNDLED)
         return OneShotPolicy(matcher, perception, min_confidence=min_confidence, feasible=reachable)
     if method in ("learned", "routed"):
         return OneShotPolicy.from_pretrained(

@@ -6,12 +6,14 @@ matching networks are worth.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
 from imop.geometry.cloud import PointCloud, farthest_points, voxel_downsample
 from imop.geometry.features import fpfh
 from imop.geometry.ransac import mutual_matches
+from imop.networks.model import BUNDLED, load_model
 from imop.networks.verification import VerificationNetwork
 from imop.policy.interfaces import BEGINNING, Candidate, Feasible, PolicyConfig, Progress, Scene, Transition
 from imop.policy.proposals import Asked, Matches
@@ -42,6 +44,15 @@ class RegistrationMatcher:
     spacing: float = 0.01
     radius: float = 0.05
     color_weight: float = 0.2
+
+    @classmethod
+    def from_pretrained(cls, weights: Path = BUNDLED) -> "RegistrationMatcher":
+        """With the verification network of a folder of weights, by default the bundled one.
+
+        Raises:
+            CorruptData: as `networks.model.load_model` does.
+        """
+        return cls(load_model(weights).verification)
 
     def prepare(self, steps: Sequence[Transition]) -> list["RegisteredStep"]:
         """Find the regions of a demonstration and describe them."""
