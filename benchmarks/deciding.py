@@ -26,8 +26,9 @@ from rich.table import Table
 from imop.errors import ImopError, InvalidInput, NoConfidentMatch
 from imop.evaluation.cases import CaseOptions, made
 from imop.evaluation.methods import make_policy
-from imop.evaluation.open_loop import Case, ToldRouter
+from imop.evaluation.open_loop import Case
 from imop.files import replaced
+from imop.policy.interfaces import BEGINNING, Progress
 from imop.policy.one_shot import OneShotPolicy
 
 
@@ -64,27 +65,24 @@ class Times:
 def decisions(case: Case, methods: list[str]) -> Iterator[Times]:
     """Every method asked for every step of every scene, told which step it is."""
     shown = case.demonstration
-    policies: dict[str, tuple[OneShotPolicy, ToldRouter]] = {}
+    policies: dict[str, OneShotPolicy] = {}
     for method in methods:
         policy = make_policy(method)
         if not isinstance(policy, OneShotPolicy):
             raise InvalidInput("methods", method, "methods that look at images")
-        policy.router = told = ToldRouter(policy.router)
         policy.watch(shown.stripped())
-        policies[method] = policy, told
+        policies[method] = policy
     for query, recorded in case.queries.items():
-        for policy, _ in policies.values():
-            policy.reset()
+        progress = dict.fromkeys(methods, BEGINNING)
         for step in range(min(len(shown), len(recorded))):
             observation = recorded.keyframes[step].observation.stripped()
             taken = {}
-            for method, (policy, told) in policies.items():
-                told.step = step
+            for method, policy in policies.items():
                 started = time.perf_counter()
                 with suppress(NoConfidentMatch):
-                    policy.act(observation)
+                    action = policy.locate(policy.see(observation), step, progress=progress[method])
+                    progress[method] = Progress(action.match.T_query_support)
                 taken[method] = 1000 * (time.perf_counter() - started)
-                told.go_on()
             yield Times(case.task, query, step, taken)
 
 

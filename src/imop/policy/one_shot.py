@@ -108,7 +108,7 @@ class OneShotPolicy:
         if self._perception.align_views:
             # One set-up has one calibration: all that is shown tells of it.
             self._camera_errors |= find_errors(seen, self._camera_errors)
-        scenes = [self.see(observation) for observation in seen]
+        scenes = [self._scene(corrected(observation, self._camera_errors)) for observation in seen]
         if focus is not None:
             scenes = _focused(scenes, demonstration, focus)
         steps = [
@@ -161,6 +161,9 @@ class OneShotPolicy:
         if self._perception.align_views:
             # A camera may have been knocked since; else the errors stay as they are.
             observation = corrected(observation, find_errors([observation], self._camera_errors))
+        return self._scene(observation, focus)
+
+    def _scene(self, observation: Observation, focus: Focus | None = None) -> Scene:
         cloud = self._perception.points(observation)
         return Scene(observation, cloud, None if focus is None else in_focus(focus, observation, cloud))
 

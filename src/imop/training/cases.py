@@ -4,7 +4,7 @@ python -m imop.training.cases --out DIR --cases N --seed S [--weights FOLDER] [-
 
 A case is one step of a procedural demonstration and one scene in which it has to be done. The networks find
 its region, the search proposes motions stage by stage, and the known poses say which of them take the gripper
-to where it may go.
+to where it may go. In some set-ups the cameras are not quite where they are said to be.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,18 +20,20 @@ from imop.files import replaced
 from imop.geometry import se3
 from imop.geometry.accuracy import COARSE
 from imop.geometry.perception import Perception
+from imop.geometry.view_alignment import corrected, find_errors
 from imop.networks.model import BUNDLED, Model, load_model
 from imop.policy.interfaces import BEGINNING, Progress, Scene, Transition
 from imop.policy.learned import LearnedMatcher
 from imop.policy.registration import RegistrationMatcher
 from imop.policy.verification import Pool, beside_rivals
 from imop.robots.panda import panda_self_filter
+from imop.sim.sensing import calibration_error
 from imop.training.families import TRAINING
 from imop.training.families.thing import Family
 from imop.training.instances import shares
 from imop.training.synthetic import synthetic_scenes
 from imop.training.takes import Example, Take
-from imop.types import Action, BoolArray, Float32Array, FloatArray
+from imop.types import Action, BoolArray, Float32Array, FloatArray, Observation
 
 # Share of the later steps that are asked as the first of an episode, too.
 AFRESH = 0.3
@@ -41,7 +43,10 @@ ANSWERED = 0.7
 HINT_OFF = (0.003, 0.03)
 # Share of the cases that the search with descriptors instead of networks gives.
 REGISTERED = 0.15
+# Share of the set-ups whose cameras are said to be somewhere else, and how far, metres and radians.
+MISPLACED, WRONG = 0.3, (0.003, 0.009)
 _PER_FILE = 20
+_PERCEPTION = Perception(panda_self_filter().is_robot)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,26 +70,72 @@ def make_cases(
     """For each of `count` cases, for each stage of the search: inputs (H, INPUTS), (H,) which are right."""
     rng = np.random.default_rng((seed, 7))
     found: list[list[tuple[Float32Array, BoolArray]]] = []
-    perception = Perception(panda_self_filter().is_robot)
     matchers = LearnedMatcher(model), RegistrationMatcher(model.verification)
     streams = {v: synthetic_scenes(families, v, seed) for v in shares(mix)}
     while len(found) < count:
         variation = rng.choice(list(streams), p=list(shares(mix).values()))
         for group in _executions(next(streams[variation])):
             matcher = matchers[int(rng.random() < REGISTERED)]
-            prepared = matcher.prepare(_transitions(group[0].shown, perception))
-            answers: dict[int, FloatArray] = {}
-            for example in group:
-                progress = _progress(example, group, answers, rng)
-                observation = example.asked.observations[example.step]
-                query = Scene(observation, perception.points(observation))
-                stages = []
-                for pool in prepared[example.step].search.pools(query, progress):
-                    if pool.motions:
-                        stages.append(_judged(pool, example))
-                        answers[example.step] = pool.best(1)[0]
-                found.append(stages)
+            found += _cases(group, matcher, _SetUp.drawn(group[0].shown, rng), rng)
     return found[:count]
+
+
+def _cases(
+    group: Sequence[Example],
+    matcher: LearnedMatcher | RegistrationMatcher,
+    set_up: "_SetUp",
+    rng: np.random.Generator,
+) -> list[list[tuple[Float32Array, BoolArray]]]:
+    """The cases of one demonstration and one query, in the order of their steps."""
+    prepared = matcher.prepare(set_up.transitions(group[0].shown))
+    found, answers = [], dict[int, FloatArray]()
+    for example in group:
+        progress = _progress(example, group, answers, rng)
+        stages = []
+        for pool in prepared[example.step].search.pools(set_up.scene(example), progress):
+            if pool.motions:
+                stages.append(_judged(pool, example))
+                answers[example.step] = pool.best(1)[0]
+        found.append(stages)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _SetUp:
+    """Cameras that may be said to be somewhere else, and what is found out about that.
+
+    Attributes:
+        T_camera_told: camera -> (4, 4) where it is said to be, in its true frame.
+        errors: as the policy finds them from the demonstration.
+    """
+
+    T_camera_told: dict[str, FloatArray]
+    errors: dict[str, FloatArray]
+
+    @classmethod
+    def drawn(cls, shown: Take, rng: np.random.Generator) -> "_SetUp":
+        """A set-up in which the demonstration was given."""
+        if rng.random() > MISPLACED:
+            return cls({}, {})
+        told = {name: calibration_error(rng, *WRONG) for name in shown.observations[0].views}
+        return cls(told, find_errors([corrected(o, told) for o in shown.observations]))
+
+    def see(self, observation: Observation) -> Scene:
+        """As the policy sees it."""
+        seen = corrected(corrected(observation, self.T_camera_told), self.errors)
+        return Scene(seen, _PERCEPTION.points(seen))
+
+    def scene(self, example: Example) -> Scene:
+        """The query of an example."""
+        return self.see(example.asked.observations[example.step])
+
+    def transitions(self, take: Take) -> list[Transition]:
+        """The steps of a demonstration."""
+        scenes = [self.see(observation) for observation in take.observations]
+        return [
+            Transition(scenes[k], scenes[k + 1], Action(state.T_world_gripper, state.gripper_open))
+            for k, state in enumerate(take.states[1:])
+        ]
 
 
 def _executions(examples: Sequence[Example]) -> list[list[Example]]:
@@ -93,14 +144,6 @@ def _executions(examples: Sequence[Example]) -> list[list[Example]]:
     for example in examples:
         groups.setdefault((id(example.shown), id(example.asked)), []).append(example)
     return list(groups.values())
-
-
-def _transitions(take: Take, perception: Perception) -> list[Transition]:
-    scenes = [Scene(observation, perception.points(observation)) for observation in take.observations]
-    return [
-        Transition(scenes[k], scenes[k + 1], Action(state.T_world_gripper, state.gripper_open))
-        for k, state in enumerate(take.states[1:])
-    ]
 
 
 def _progress(
