@@ -131,3 +131,9 @@ def test_if_nothing_is_in_focus_there_is_no_candidate():
     both = query(THERE)
     nothing = Scene(both.observation, both.fused, np.zeros(len(both.fused), dtype=bool))
     assert search({"fit": T}).locate(nothing) == ()
+
+
+def test_a_generator_that_is_left_out_proposes_nothing():
+    found = {c.generator for c in search({"fit": T}).locate(query(THERE))}
+    without = {c.generator for c in search({"fit": T}, without=("fit",)).locate(query(THERE))}
+    assert "fit" in found and "fit" not in without and without

@@ -39,6 +39,7 @@ class PolicyConfig:
         same_motion: motions nearer to each other than this, metres and radians, are judged once.
         fewest: a thing of fewer points is none.
         focused: share of what is next to the gripper that has to be in focus, if a focus is given.
+        without: generators (`proposals.py`) that are not asked, to measure what they bring.
     """
 
     enough: float = 0.9
@@ -56,6 +57,7 @@ class PolicyConfig:
     same_motion: tuple[float, float] = (0.002, 0.02)
     fewest: int = 30
     focused: float = 0.5
+    without: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -159,7 +159,8 @@ class Pool:
     def add(self, name: str, motions: Sequence[FloatArray]) -> None:
         """Judge motions that differ from all before; the most promising ones, if there are too many."""
         sought = self._sought
-        new = np.stack(motions) if motions else np.zeros((0, 4, 4))
+        asked = motions and name not in sought.config.without
+        new = np.stack(motions) if asked else np.zeros((0, 4, 4))
         if len(new) and self.target.query.focus is not None:
             new = self._in_focus(new)
         if not len(new):
