@@ -7,6 +7,7 @@ from imop.geometry import se3
 from imop.geometry.cloud import concatenate
 from imop.networks.verification import EVIDENCE
 from imop.policy.evidence import OFFSET, Surface, Template, glance, pattern, shades, shares
+from imop.policy.interfaces import PolicyConfig
 from imop.policy.region import Region
 from tests.policy.scenes import BLUE, GREEN, RED, at, box, camera, moved
 
@@ -21,7 +22,7 @@ def region(cloud, spread=0.001, context=None):
 
 def evidence(cloud, query, T=None, depth=None, spread=0.001, context=None):
     """By name, of one motion."""
-    template = Template(region(cloud, spread, context), GOAL, cloud, (camera(),))
+    template = Template(region(cloud, spread, context), GOAL, cloud, (camera(),), PolicyConfig())
     motion = (np.eye(4) if T is None else T)[None]
     row = shares(template, Surface(query, (camera(depth),)), motion)[0]
     return dict(zip(EVIDENCE, row, strict=False))
@@ -45,7 +46,7 @@ def test_other_motions_are_explained_less(wrong):
 
 def test_a_glance_prefers_the_true_motion_in_every_column():
     cloud, T = box(SIZE, RED), at(0.2, 0.1, yaw=1.0)
-    template = Template(region(cloud), GOAL, cloud, ())
+    template = Template(region(cloud), GOAL, cloud, (), PolicyConfig())
     looks = glance(template, Surface(moved(cloud, T), ()), np.stack([T, at(0.03, 0.0, 0.0) @ T]))
     assert looks.shape == (2, 4) and (looks[0] > looks[1]).all() and (looks[0] > 0.8).all()
 
@@ -64,7 +65,11 @@ def test_what_is_firm_counts_where_the_rest_may_differ():
     spread = np.where(upper, 0.001, 0.05)
     query = cloud.select(upper)
     template = Template(
-        Region(cloud, np.ones(len(cloud)), np.zeros((0, 3)), spread=spread), GOAL, cloud, (camera(),)
+        Region(cloud, np.ones(len(cloud)), np.zeros((0, 3)), spread=spread),
+        GOAL,
+        cloud,
+        (camera(),),
+        PolicyConfig(),
     )
     row = dict(zip(EVIDENCE, shares(template, Surface(query, ()), np.eye(4)[None])[0], strict=False))
     assert row["firm_loose"] + row["firm_hidden"] > 0.95 and row["region_hidden"] > 2 * row["firm_hidden"]
@@ -136,8 +141,8 @@ def test_evidence_moves_with_both_scenes():
     cloud, query = box(SIZE, RED), box(SIZE, RED, seed=1)
     A, B = at(0.1, 0.2, 0.0, yaw=0.5), at(-0.1, 0.1, 0.0, yaw=-1.0)
     goal = se3.apply(A, GOAL[None])[0]
-    here = Template(region(cloud), GOAL, cloud, ())
-    there = Template(region(moved(cloud, A)), goal, moved(cloud, A), ())
+    here = Template(region(cloud), GOAL, cloud, (), PolicyConfig())
+    there = Template(region(moved(cloud, A)), goal, moved(cloud, A), (), PolicyConfig())
     T = at(0.01, 0.0, 0.0)
     one = shares(here, Surface(query, ()), T[None])
     other = shares(there, Surface(moved(query, B), ()), (B @ T @ se3.invert(A))[None])

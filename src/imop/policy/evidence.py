@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, concatenate, farthest_points, project
+from imop.policy.interfaces import PolicyConfig
 from imop.policy.region import Region
 from imop.types import BoolArray, CameraView, Float32Array, FloatArray
 
@@ -37,10 +38,6 @@ BESIDE = 0.08
 CLASH, NOISE = 0.1, 0.02
 # What is next to the gripper: scale of the weights, metres.
 NEXT = 0.05
-# Points that are compared: of the region, of its context, and of what was observed around it.
-POINTS, CONTEXT, BACKWARD = 400, 150, 200
-# The same at a glance.
-GLANCE, GLANCE_CONTEXT = 100, 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,20 +130,33 @@ class Template:
         p_goal: (3,) where the action takes the tip.
         beside: what stands around there in the demonstrated scene, with normals; at least one point.
         views: of the demonstrated scene.
+        config: says how many points are compared.
 
     Attributes:
         cloud: points of the region, `size` of them, then of its context.
+        glance: those that are compared at a glance.
+        backward: how many observed points are compared with the region.
         hue, spread: (M, 4) shades and (M,) spread of them.
         weights: (M, 4), see `_weights`.
         marks: variance of the region's shades.
     """
 
     def __init__(
-        self, region: Region, p_goal: FloatArray, beside: PointCloud, views: Sequence[CameraView]
+        self,
+        region: Region,
+        p_goal: FloatArray,
+        beside: PointCloud,
+        views: Sequence[CameraView],
+        config: PolicyConfig,
     ) -> None:
-        chosen = farthest_points(region.cloud.points, POINTS)
+        compared, compared_context, self.backward = config.compared
+        chosen = farthest_points(region.cloud.points, compared)
         context = region.context
-        few = farthest_points(context.points, CONTEXT) if context is not None else np.zeros(0, dtype=np.int64)
+        few = (
+            farthest_points(context.points, compared_context)
+            if context is not None
+            else np.zeros(0, dtype=np.int64)
+        )
         parts = [region.cloud.select(chosen)]
         if context is not None:
             parts.append(context.select(few))
@@ -156,9 +166,8 @@ class Template:
         self.weights = self._weights(region, chosen, len(few), p_goal)
         self.size, self.marks = len(chosen), float(self.hue[: len(chosen)].var(axis=0).sum())
         glance = np.arange(len(self.cloud))
-        self.glance = glance[
-            (glance < GLANCE) | (glance >= self.size) & (glance < self.size + GLANCE_CONTEXT)
-        ]
+        own, others = config.glanced
+        self.glance = glance[(glance < own) | (glance >= self.size) & (glance < self.size + others)]
         self.whole, self.beside = Surface(region.whole, views), Surface(beside, views)
         self.region, self.p_goal = region, p_goal
 
@@ -269,19 +278,19 @@ def _backward(template: Template, surface: Surface, T: FloatArray) -> FloatArray
     whole, back = template.whole, se3.invert(T)
     points = se3.apply(back, surface.cloud.points[surface.sample])
     near = np.flatnonzero(np.isfinite(whole.tree.query(points, distance_upper_bound=AROUND)[0]))
-    found = _explain(whole, surface.cloud.select(surface.sample[_some(near)]), back)
+    found = _explain(whole, surface.cloud.select(surface.sample[_some(near, template.backward)]), back)
     got, all_of_it = max(float(found.loose.sum()), 1e-9), max(len(found.loose), 1)
     color, clash = found.loose @ found.color / got, found.loose @ (found.color < CLASH) / got
     forward = _explain(surface, template.beside.cloud, T).loose
     at = se3.apply(T, template.p_goal[None])[0]
     inside = np.asarray(surface.tree.query_ball_point(at, BESIDE, return_sorted=True), dtype=np.int64)
-    there = _explain(template.beside, surface.cloud.select(_some(inside)), back).loose
+    there = _explain(template.beside, surface.cloud.select(_some(inside, template.backward)), back).loose
     return np.array([got / all_of_it, color, clash, np.log1p(len(near)) / 5, forward.mean(), _mean(there)])
 
 
-def _some(index: NDArray[np.int64]) -> NDArray[np.int64]:
-    """About `BACKWARD` of them, spread over the grid in which they are sorted."""
-    return index[:: max(1, len(index) // BACKWARD)]
+def _some(index: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """About so many of them, spread over the grid in which they are sorted."""
+    return index[:: max(1, len(index) // count)]
 
 
 def _mean(values: FloatArray) -> float:

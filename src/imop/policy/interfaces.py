@@ -38,6 +38,9 @@ class PolicyConfig:
         next_to: what of the region is this near to where the gripper goes is a part of its own, metres.
         same_motion: motions nearer to each other than this, metres and radians, are judged once.
         fewest: a thing of fewer points is none.
+        compared: points of the region, of its context, and of what was observed around it, that are compared.
+        glanced: points of the region and of its context that are compared at a glance.
+        keypoints: points of the region, and of a scene, that registration describes.
         focused: share of what is next to the gripper that has to be in focus, if a focus is given.
         without: generators (`proposals.py`) that are not asked, to measure what they bring.
     """
@@ -56,6 +59,9 @@ class PolicyConfig:
     next_to: float = 0.05
     same_motion: tuple[float, float] = (0.002, 0.02)
     fewest: int = 30
+    compared: tuple[int, int, int] = (400, 150, 200)
+    glanced: tuple[int, int] = (100, 40)
+    keypoints: tuple[int, int] = (800, 2500)
     focused: float = 0.5
     without: tuple[str, ...] = ()
 

@@ -40,8 +40,6 @@ KNOWN, MUCH_MORE = 0.5, 0.8
 # A region of fewer points is a scrap. It is not believed if it is farther from where the gripper goes than
 # something else is, by this much, metres.
 SCRAP, FARTHER = 100, 0.05
-# A node is in focus if a point in focus is this near to it, metres.
-FOCUS = 0.01
 # Points nearer to each other than this are of one voxel or of neighbours, metres.
 NEXT = 0.006
 
@@ -168,7 +166,7 @@ def _find(
     with torch.inference_mode():
         predicted = model.region(batch)
     nodes = before.points.double().numpy()
-    meant = torch.from_numpy(step.before.focused(nodes, FOCUS))
+    meant = torch.from_numpy(step.before.focused(nodes, SAME))
     probability = torch.where(meant, predicted.probability, 0.0) if meant.any() else predicted.probability
     inside = _likely(probability, threshold)
     standing = ~step.before.ground.bare[nearest(nodes, step.before.cloud.points)[1][:, 0]]

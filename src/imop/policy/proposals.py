@@ -36,9 +36,9 @@ SOME = 0.1
 # Share of a thing that has to look the same after a turn, and how near that is, metres.
 ALIKE, NEAR = 0.8, 0.006
 # Points that are compared, and how far off the middle of what was seen the axis may be, metres.
-POINTS, OFF = 200, (-0.008, 0.0, 0.008)
-# Axes of half turns that are tried, metres off the middle, and how many of them are refined.
-AXES, REFINED = (-0.05, -0.025, 0.0, 0.025, 0.05), 4
+POINTS, OFF = 200, 0.008
+# The same of a half turn, and how many axes are refined.
+AXES, REFINED = 0.05, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +138,7 @@ def equal_turns(cloud: PointCloud) -> FloatArray:
     few, found = points[farthest_points(points, POINTS)], []
     for angle in np.radians(np.arange(45.0, 360.0, 45.0)):
         R = se3.euler(z=float(angle))
-        motions = np.stack([se3.make(R, center - R @ center + (x, y, 0.0)) for x, y in product(OFF, OFF)])
+        motions = np.stack([se3.make(R, center - R @ center + (x, y, 0.0)) for x, y in _around(OFF, 3)])
         alike = onto(few, points, motions)
         if alike.max() > ALIKE:
             found.append((angle, motions[int(np.argmax(alike))]))
@@ -155,7 +155,7 @@ def half_turn(points: FloatArray) -> FloatArray:
     """
     few, center = points[farthest_points(points, POINTS)], middle(points)
     R = se3.euler(z=np.pi)
-    axes = [center + np.array([x, y, 0.0]) for x, y in product(AXES, AXES)]
+    axes = [center + np.array([x, y, 0.0]) for x, y in _around(AXES, 5)]
     motions = np.stack([se3.make(R, axis - R @ axis) for axis in axes])
     best = motions[np.argsort(-onto(few, points, motions), kind="stable")[:REFINED]]
     if len(points) >= 5:
@@ -163,6 +163,12 @@ def half_turn(points: FloatArray) -> FloatArray:
         best = np.stack([*best, *(upright(refine(few, T), center) for T in best)])
     chosen: FloatArray = best[np.argmax(onto(few, points, best))]
     return chosen
+
+
+def _around(far: float, count: int) -> list[tuple[float, float]]:
+    """Offsets in a square grid of `count` rows, up to `far` to each side."""
+    side = np.linspace(-far, far, count).tolist()
+    return list(product(side, side))
 
 
 def onto(few: FloatArray, points: FloatArray, motions: FloatArray) -> FloatArray:

@@ -23,9 +23,6 @@ from imop.policy.target import without_held
 from imop.policy.verification import Verifier
 from imop.types import FloatArray
 
-# Points of the region, and of the scene, that are described.
-KEYPOINTS, SEEN = 800, 2500
-
 
 @dataclass(frozen=True)
 class RegistrationMatcher:
@@ -74,7 +71,7 @@ class RegisteredStep:
 
     def __init__(self, matcher: RegistrationMatcher, step: Transition, region: Region) -> None:
         self._matcher, self._region = matcher, region
-        self._keypoints, self._described = matcher.describe(region.cloud, KEYPOINTS)
+        self._keypoints, self._described = matcher.describe(region.cloud, matcher.config.keypoints[0])
         verifier = Verifier(matcher.verification)
         self.search = StepSearch(matcher.config, step, region, None, verifier, self._ask)
 
@@ -92,7 +89,7 @@ class RegisteredStep:
     def _ask(self, query: Scene) -> Asked:
         """Descriptors that choose each other."""
         standing = without_held(query.cloud.select(~query.ground.bare), query, self._region)
-        keypoints, descriptors = self._matcher.describe(standing, SEEN)
+        keypoints, descriptors = self._matcher.describe(standing, self._matcher.config.keypoints[1])
         pairs = mutual_matches(self._described, descriptors)
         x, y = self._keypoints.select(pairs.i_support), keypoints.select(pairs.i_query)
         assert x.normals is not None and y.normals is not None

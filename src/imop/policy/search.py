@@ -41,7 +41,7 @@ class StepSearch:
         before, T_goal = step.before, step.action.T_world_gripper
         views = tuple(before.observation.views.values())
         standing = before.cloud.select(~before.ground.bare)
-        template = Template(region, T_goal[:3, 3], _beside(standing, T_goal, region), views)
+        template = Template(region, T_goal[:3, 3], _beside(standing, T_goal, region), views, config)
         parts = _parts(region, payload, T_goal[:3, 3], config)
         turns = equal_turns(region.cloud)
         self.sought, self._ask = Sought(config, step, region, template, parts, turns, verifier), ask

@@ -15,6 +15,7 @@ from imop.geometry import se3
 from imop.geometry.icp import CLOSE, FINEST
 from imop.geometry.ransac import distinct
 from imop.networks.verification import EVIDENCE, RIVALRY, VerificationNetwork
+from imop.policy.contacts import SAME
 from imop.policy.evidence import Template, glance, shares
 from imop.policy.interfaces import Candidate, PolicyConfig, Transition
 from imop.policy.proposals import Asked, Matches
@@ -24,8 +25,6 @@ from imop.types import BoolArray, FloatArray
 
 # Candidates that take the gripper farther apart than this, metres and radians, are rivals.
 ELSEWHERE = (0.02, 0.26)
-# A point of the region is in focus if a point in focus is this near to it, metres.
-IN_FOCUS = 0.02
 
 
 class Verifier:
@@ -181,7 +180,7 @@ class Pool:
         """Those of motions (H, 4, 4) that act on what is meant."""
         template = self._sought.template
         near, which = template.weights[: template.size, 1], np.arange(template.size)
-        inside = self.target.query.focused(template.moved(T, which)[0], IN_FOCUS)
+        inside = self.target.query.focused(template.moved(T, which)[0], SAME)
         share = inside.reshape(len(T), -1) @ near / near.sum()
         return np.asarray(T[share >= self._sought.config.focused])
 
