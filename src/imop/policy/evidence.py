@@ -149,17 +149,12 @@ class Template:
         views: Sequence[CameraView],
         config: PolicyConfig,
     ) -> None:
-        compared, compared_context, self.backward = config.compared
-        chosen = farthest_points(region.cloud.points, compared)
-        context = region.context
-        few = (
-            farthest_points(context.points, compared_context)
-            if context is not None
-            else np.zeros(0, dtype=np.int64)
-        )
+        own, others, self.backward = config.compared
+        chosen, few = farthest_points(region.cloud.points, own), np.zeros(0, dtype=np.int64)
         parts = [region.cloud.select(chosen)]
-        if context is not None:
-            parts.append(context.select(few))
+        if region.context is not None:
+            few = farthest_points(region.context.points, others)
+            parts.append(region.context.select(few))
         self.cloud = concatenate(parts)
         self.hue = shades(self.cloud.colors)
         self.spread = np.concatenate([region.spreads[chosen], np.full(len(few), OFFSET)])
