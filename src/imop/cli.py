@@ -425,8 +425,8 @@ def train(
         config: how to train.
         ablation: what is left out of the networks or exchanged.
         size: of the networks.
-        recipe: small makes shards, all networks and their card, in a day of two cores; trial only tries
-            whether everything runs. Goes with --out and --jobs alone.
+        recipe: small makes shards, all networks and their card, in some ten hours of two cores; trial tells
+            in minutes whether everything runs. Goes with --out and --jobs alone.
         jobs: processes of a recipe; 2 if not given.
     """
     from imop.networks.model import PAPER, SMALL

@@ -3,6 +3,7 @@
 import json
 import os
 import shlex
+import signal
 import subprocess
 import sys
 import time
@@ -48,9 +49,15 @@ class Stage:
 def run(every: Sequence[Stage], out: Path, console: Console) -> None:
     """Run the stages that are not done, one after the other.
 
+    What stops this process (Ctrl-C, SIGTERM, a closed terminal) stops the command as well, which would be
+    started a second time otherwise.
+
     Raises:
         StageFailed: if a command ends with another exit code than it should, or without what it makes.
     """
+    for stop in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(stop) == signal.SIG_DFL:  # nohup ignores the latter
+            signal.signal(stop, signal.default_int_handler)
     for number, stage in enumerate(every, start=1):
         title = f"{number}/{len(every)} {stage.name}"
         if stage.done(out):
@@ -70,13 +77,15 @@ def _perform(stage: Stage, out: Path) -> None:
     environment = {"OMP_NUM_THREADS": "1", **os.environ}
     with log.open("ab") as said:
         command = [sys.executable, *shlex.split(stage.command)]
-        process = subprocess.Popen(command, stdout=said, stderr=subprocess.STDOUT, env=environment)
+        process = subprocess.Popen(
+            command, stdout=said, stderr=subprocess.STDOUT, env=environment, start_new_session=True
+        )
         try:
             code = process.wait()
-        finally:
-            # Who stops the recipe stops its command, which would be started a second time otherwise.
-            process.terminate()
+        except BaseException:
+            os.killpg(process.pid, signal.SIGTERM)  # with the processes that it has started
             process.wait()
+            raise
     if code not in stage.codes or not (out / stage.makes).exists():
         raise StageFailed(stage.name, code, log)
     with replaced(record) as temporary:
