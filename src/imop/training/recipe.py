@@ -115,26 +115,26 @@ def stages(recipe: Recipe, out: Path, jobs: int) -> list[Stage]:
     Args:
         recipe: how much of everything.
         out: folder of everything; the weights come directly into it.
-        jobs: processes. What is made does not depend on them, but for rounding.
+        jobs: processes. Shards, demonstrations and cases do not depend on them.
     """
     r, o = recipe, shlex.quote(str(out))
     mix, shares = (" ".join(map(str, numbers)) for numbers in (r.mix, r.shares))
     tasks = f" --tasks {shlex.join(r.tasks)}" if r.tasks else ""
-    make = f"-m imop.training.generate --jobs {jobs} --out {o}/shards"
+    generate = f"-m imop.training.generate --jobs {jobs} --out {o}/shards"
     search = f"-m imop.training.cases --jobs {jobs} --mix {mix} --out {o}/cases"
     verify = f"-m imop.training.verification --steps {r.verification_steps} --weights {o}/networks/merged"
     return [
-        Stage("pairs", "shards/pairs", f"{make}/pairs --pairs {r.pairs} --mix {mix} --seed 10"),
+        Stage("pairs", "shards/pairs", f"{generate}/pairs --pairs {r.pairs} --mix {mix} --seed 10"),
         Stage(
             "validation",
             "shards/validation",
-            f"{make}/validation --pairs {r.validation} --mix {mix} --seed 20",
+            f"{generate}/validation --pairs {r.validation} --mix {mix} --seed 20",
         ),
-        Stage("routes", "shards/routes", f"{make}/routes --routes {r.routes} --seed 30"),
+        Stage("routes", "shards/routes", f"{generate}/routes --routes {r.routes} --seed 30"),
         Stage(
             "validation_routes",
             "shards/validation_routes",
-            f"{make}/validation_routes --routes {r.validation_routes} --seed 40",
+            f"{generate}/validation_routes --routes {r.validation_routes} --seed 40",
         ),
         Stage(
             "demonstrations",
@@ -196,13 +196,13 @@ def stages(recipe: Recipe, out: Path, jobs: int) -> list[Stage]:
 
 
 def _loop(batch: int, jobs: int) -> str:
-    """The training on as many processes as can share the batch, so that every step has the same samples."""
+    """The training on as many processes as can share the batch; every step has the same samples on any."""
     import torch
 
     most = torch.cuda.device_count() or jobs
     processes = max(n for n in range(1, most + 1) if batch % n == 0)
-    run = f"-m torch.distributed.run --standalone --nproc-per-node {processes}"
-    return f"{run} -m imop.training.loop --batch {batch // processes}"
+    torchrun = f"-m torch.distributed.run --standalone --nproc-per-node {processes}"
+    return f"{torchrun} -m imop.training.loop --batch {batch // processes}"
 
 
 def make(name: RecipeName, out: Path, jobs: int, console: Console) -> None:
@@ -260,7 +260,7 @@ def refuse_others(config: TrainConfig, ablation: Ablation, size: str) -> None:
     """A recipe decides everything but the folder and the number of processes.
 
     Raises:
-        InvalidInput: if anything else is not as it is without being named.
+        InvalidInput: if an option of another training does not have its default.
     """
     usual = {**asdict(TrainConfig(config.out)), **asdict(Ablation()), "size": "small"}
     given = {**asdict(config), **asdict(ablation), "size": size}
