@@ -81,7 +81,7 @@ CHILD = """
 import os, time
 open("begun", "w").write(str(os.getpid()))
 os.rename("begun", "pid")
-time.sleep(60)
+time.sleep(600)
 """
 STAGES = """
 import sys
