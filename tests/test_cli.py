@@ -76,6 +76,12 @@ def test_help_lists_the_verbs(capsys):
         (("train", "--out", "/tmp/never"), "train"),
         (("train", "--out", "/tmp/never", "--train", "/nowhere", "--pose", "regressed"), "networks"),
         (("train", "--out", "/tmp/never", "--train", "/nowhere"), "/nowhere"),
+        (("train", "--out", "/tmp/never", "--recipe", "small", "--steps", "5"), "steps"),
+        (("train", "--out", "/tmp/never", "--recipe", "small", "--train", "/nowhere"), "train"),
+        (("train", "--out", "/tmp/never", "--recipe", "small", "--no-region-first"), "region_first"),
+        (("train", "--out", "/tmp/never", "--recipe", "small", "--size", "paper"), "size"),
+        (("train", "--out", "/tmp/never", "--recipe", "small", "--jobs", "0"), "jobs"),
+        (("train", "--out", "/tmp/never", "--train", "/nowhere", "--jobs", "2"), "jobs"),
         (("model", "--weights", "/nowhere"), "/nowhere"),
     ],
 )

@@ -16,10 +16,11 @@ from rich.status import Status
 from rich.text import Text
 from tyro.conf import Positional
 
-from imop.errors import ImopError, MissingExtra
+from imop.errors import ImopError, InvalidInput, MissingExtra
 from imop.files import writable_folder
 from imop.training.ablation import Ablation
 from imop.training.config import TrainConfig
+from imop.training.recipe import RecipeName, make, refuse_others
 
 # Verbs import what they need when they run, so that --help does not wait for torch and MuJoCo.
 
@@ -411,20 +412,33 @@ def train(
     config: Annotated[TrainConfig, tyro.conf.OmitArgPrefixes],
     ablation: Annotated[Ablation, tyro.conf.OmitArgPrefixes],
     size: Literal["small", "paper"] = "small",
+    recipe: RecipeName | None = None,
+    jobs: int | None = None,
 ) -> int:
     """Train networks on shards; run again with the same arguments, it continues where it was stopped.
 
     Shards are written by `python -m imop.training.generate` and its neighbours, see docs/training.md. Under
-    torchrun it trains on several processes or machines.
+    torchrun it trains on several processes or machines. A recipe makes everything from the shards on.
 
     Args:
         config: how to train.
         ablation: what is left out of the networks or exchanged.
         size: of the networks.
+        recipe: small makes shards, all networks and their card, in some ten hours of two cores; trial tells
+            in minutes whether everything runs. Goes with --out and --jobs alone.
+        jobs: processes of a recipe; 2 if not given.
     """
     from imop.networks.model import PAPER, SMALL
     from imop.training.loop import train as run_training
 
+    if recipe is not None:
+        refuse_others(config, ablation, size)
+        writable_folder(config.out)
+        make(recipe, config.out, 2 if jobs is None else jobs, console)
+        console.print(config.out)
+        return 0
+    if jobs is not None:
+        raise InvalidInput("jobs", f"{jobs} without --recipe", "torchrun for a training on several processes")
     writable_folder(config.out)
     run_training(config, ablation.of(SMALL if size == "small" else PAPER), console=console)
     console.print(config.out)
@@ -474,3 +488,7 @@ def _fail(problem: str) -> int:
     line = Text.assemble(("error:", "red"), " ", " ".join(problem.split()))
     Console(stderr=True, soft_wrap=True).print(line)
     return 2
+
+
+if __name__ == "__main__":
+    main()

@@ -80,6 +80,15 @@ class NoConfidentMatch(ImopError):
         super().__init__(f"confidence: {confidence:.2f} is below the required {required:.2f}")
 
 
+class StageFailed(ImopError):
+    """A command of a recipe did not do what it should; `log` holds all that it said."""
+
+    def __init__(self, stage: str, code: int, log: Path):
+        self.stage, self.code, self.log = stage, code, log
+        remedy = "mend it and start the recipe again; what is done stays"
+        super().__init__(f"{stage}: ended with exit code {code}, see the end of {log}; remedy: {remedy}")
+
+
 class MissingExtra(ImopError):
     """An optional dependency is not installed."""
 

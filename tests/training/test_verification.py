@@ -9,6 +9,7 @@ import torch
 from imop.geometry import se3
 from imop.networks.model import BUNDLED, load_model
 from imop.networks.verification import INPUTS, VerificationConfig, VerificationNetwork
+from imop.training import cases
 from imop.training.cases import Cases, make_cases, read_cases, right_goals, write_cases
 from imop.training.families import TRAINING
 from imop.training.verification import VerificationTraining, fit, loss
@@ -75,3 +76,11 @@ def test_cases_are_made_again_written_and_read(tmp_path):
     assert found.inputs.shape == (2 * sum(len(right) for _, right in stages), INPUTS)
     assert found.case.max() + 1 == 2 * len(stages) and (np.diff(found.case) >= 0).all()
     assert found.right.mean() > 0 and np.isfinite(found.inputs).all()
+
+
+def test_as_many_cases_are_made_as_are_asked_for(tmp_path, monkeypatch):
+    case = [(np.zeros((2, INPUTS), np.float32), np.array([True, False]))]
+    monkeypatch.setattr(cases, "make_cases", lambda *given: [case] * given[-1])
+    monkeypatch.setattr("sys.argv", ["cases", "--out", str(tmp_path), "--cases", "23"])
+    cases.main()
+    assert read_cases(tmp_path).case.max() + 1 == 23 and len(list(tmp_path.iterdir())) == 2

@@ -229,7 +229,8 @@ def _file(config: CasesConfig, number: int) -> None:
     path = config.out / f"cases-{number:05d}.npz"
     if not path.exists():
         content = int(np.random.SeedSequence([config.seed, number]).generate_state(1)[0])
-        made = make_cases(load_model(config.weights), TRAINING, config.mix, content, _PER_FILE)
+        size = min(_PER_FILE, config.cases - number * _PER_FILE)
+        made = make_cases(load_model(config.weights), TRAINING, config.mix, content, size)
         write_cases(made, path)
         print(path, flush=True)
 
