@@ -35,6 +35,7 @@ class Episode:
         success: whether the task was done; None if the objects of the scene found no place.
         reason: why the episode ended.
         actions: how many were taken.
+        error: whether it ended because something could not be handled, which counts as a failure.
     """
 
     trial: Trial
@@ -43,6 +44,7 @@ class Episode:
     success: bool | None
     reason: str
     actions: int = 0
+    error: bool = False
 
 
 class EpisodeLog:

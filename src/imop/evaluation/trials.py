@@ -31,6 +31,7 @@ class Trial:
         instance: seed of shapes, sizes and colours.
         change: names of `tasks.changes.FACTORS`, joined by commas; what the scene differs in.
         shown: that of the demonstration; None if it is the same.
+        shown_variation: of the task in the demonstration; None if it is the same.
 
     Raises:
         InvalidInput: for a negative seed, or an unknown change.
@@ -42,6 +43,7 @@ class Trial:
     instance: int = 0
     change: str = ""
     shown: int | None = None
+    shown_variation: int | None = None
 
     def __post_init__(self) -> None:
         for name in ("seed", "instance", "shown"):
@@ -52,16 +54,19 @@ class Trial:
     @cached_property
     def changed(self) -> Change:
         """What the scene, and what is seen of it, differs in."""
-        return Change.of(self.change, self.task, self.variation, self.shown_instance, self.seed)
+        shown = self.demonstrated
+        return Change.of(self.change, self.task, shown.variation, shown.instance, self.seed)
 
     def make_task(self) -> Task:
         """The task, its things at their size in the scene."""
         return self.changed.of_size(make_task(self.task))
 
     @property
-    def shown_instance(self) -> int:
-        """Seed of the objects of the demonstration."""
-        return self.instance if self.shown is None else self.shown
+    def demonstrated(self) -> "Trial":
+        """The trial as it would be with the things and the aim of the demonstration."""
+        instance = self.instance if self.shown is None else self.shown
+        variation = self.variation if self.shown_variation is None else self.shown_variation
+        return replace(self, instance=instance, variation=variation, shown=None, shown_variation=None)
 
     def env(self) -> ImopEnv:
         """The environment, reset to this scene.
@@ -77,7 +82,7 @@ class Trial:
 
 
 def demonstration_for(trial: Trial) -> Demonstration:
-    """One demonstration of the trial's task, variation and shown instance, in a scene that is never tested.
+    """One demonstration of the trial's task, shown variation and instance, in a scene that is never tested.
 
     The trial's change of the scene does not apply to it, but that of the set-up does.
 
@@ -85,10 +90,10 @@ def demonstration_for(trial: Trial) -> Demonstration:
         ExpertFailed: if the expert succeeds in none of the scenes it may choose from.
         NoRoom: if not even a scene was found.
     """
-    task = make_task(trial.task)
+    task, shown = make_task(trial.task), trial.demonstrated
     for seed in range(DEMONSTRATION_SEED, DEMONSTRATION_SEED + _RECORDING_ATTEMPTS):
         try:
-            recorded = record_demonstration(task, seed, trial.variation, trial.shown_instance)
+            recorded = record_demonstration(task, seed, shown.variation, shown.instance)
             return _seen(recorded, trial.changed.shown)
         except (ExpertFailed, NoRoom) as error:
             failure: ImopError = error
