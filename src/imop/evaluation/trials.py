@@ -68,6 +68,12 @@ class Trial:
         variation = self.variation if self.shown_variation is None else self.shown_variation
         return replace(self, instance=instance, variation=variation, shown=None, shown_variation=None)
 
+    @property
+    def other_things(self) -> bool:
+        """Whether the scene has other things than the demonstration."""
+        shown = self.demonstrated
+        return (shown.variation, shown.instance) != (self.variation, self.instance)
+
     def env(self) -> ImopEnv:
         """The environment, reset to this scene.
 
@@ -131,8 +137,9 @@ def suite_trials(
         problem = f"{episodes} scenes from {seed} on"
         raise InvalidInput("seed", problem, f"scenes below {DEMONSTRATION_SEED}, where demonstrations begin")
     kinds = {name: find_task(name) for name in chosen_tasks(suite, split, tasks)}
-    if single := [name for name, kind in kinds.items() if other and kind.one_instance]:
-        raise InvalidInput("instances", f"other, but {single[0]} has one instance of its things", "same")
+    if other:
+        for name in kinds:
+            require_instances(name, "instances", "other", "same")
     changes = changes_of(kinds, change)
     return {
         name.removeprefix(f"{suite}/"): [
@@ -149,6 +156,16 @@ def suite_trials(
         for name, kind in kinds.items()
         if changes[name] or not change
     }
+
+
+def require_instances(task: str, field: str, value: str, accepted: str) -> None:
+    """Refuse a value that asks for another instance of the things of a task.
+
+    Raises:
+        InvalidInput: if the task has one instance only, or there is no such task.
+    """
+    if find_task(task).one_instance:
+        raise InvalidInput(field, f"{value}, but {task} has one instance of its things", accepted)
 
 
 def change_notes(trials: Mapping[str, Sequence[Trial]], change: str) -> list[str]:
