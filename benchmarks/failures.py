@@ -1,7 +1,8 @@
 """Why episodes of `imop eval` failed: table by task and cause, and a picture of one of each cause.
 
-Every failed episode of the log is acted again, with code and weights as they are now; what succeeds now is
-counted as such. Pictures of RLBench must not be distributed.
+Every failed episode of the log is acted again after the same demonstration, also of other things than in the
+scene, with code and weights as they are now; what succeeds now is counted as such. Pictures of RLBench must
+not be distributed.
 
     imop eval --suite rlbench --methods learned --out DIR
     python benchmarks/failures.py --log DIR/episodes.jsonl --out DIR/failures --jobs 2
@@ -11,7 +12,7 @@ import json
 import shlex
 import sys
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -79,7 +80,7 @@ def look(trials: list[Trial], method: str, weights: Path | None) -> list[Found]:
 
 
 def together(trials: list[Trial]) -> list[list[Trial]]:
-    groups: dict[tuple[str, int, int], list[Trial]] = {}
+    groups: dict[tuple[str, int, int, str], list[Trial]] = {}
     for trial in trials:
         groups.setdefault(shown_together(trial), []).append(trial)
     return list(groups.values())
@@ -90,7 +91,7 @@ def cause_of(diagnosis: Diagnosis | None) -> str:
 
 
 def as_dict(trial: Trial, diagnosis: Diagnosis | None) -> dict[str, object]:
-    row: dict[str, object] = {"task": trial.task, "seed": trial.seed, "cause": cause_of(diagnosis)}
+    row: dict[str, object] = {**asdict(trial), "cause": cause_of(diagnosis)}
     if diagnosis is None:
         return row
     centimetres, degrees = 100 * diagnosis.off[0], np.degrees(diagnosis.off[1])

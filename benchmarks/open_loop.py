@@ -4,6 +4,10 @@ In simulation: one demonstration per task and variation, and scenes that the exp
 
     python benchmarks/open_loop.py --suite tabletop --split novel --scenes 3 --json open_loop.json
 
+With `--instances other` every scene shows other objects than the demonstration: where their expert went is
+right, and so is the demonstrated pose in the frame of the new object. Regions are compared with the
+demonstrated objects.
+
 On recordings in RLBench's layout: every ordered pair of episodes of the same task and variation. The robot is
 removed by its kinematics; no instance ids, no names.
 

@@ -64,6 +64,8 @@ def test_help_lists_the_verbs(capsys):
         (("run", "--task", POT, "--seed", "-4"), "seed"),
         (("run", "--task", POT, "--variation", "9"), "variation"),
         (("run", "--task", POT, "--demo", "/nowhere"), "/nowhere"),
+        (("run", "--task", POT, "--shown", "2", "--demo", "/nowhere"), "shown"),
+        (("run", "--task", "rlbench/open_drawer", "--shown", "2"), "one instance"),
         (("eval", "--suite", "kitchen"), "suite"),
         (("eval", "--methods", "magic"), "methods"),
         (("eval", "--tasks", "juggle"), "tasks"),
@@ -106,6 +108,16 @@ def test_a_successful_run_writes_result_picture_and_video(store, tmp_path, capsy
     assert max(step["position_error"] for step in result["steps"]) < 0.01
     assert (tmp_path / "steps.png").stat().st_size > 10_000
     assert (tmp_path / "rollout.mp4").stat().st_size > 10_000
+
+
+def test_a_laptop_is_closed_after_another_one_was_shown_and_nothing_is_off(tmp_path, capsys):
+    task = ("run", "--task", "tabletop/close_laptop", "--method", "oracle")
+    which = ("--instance", "1", "--shown", "0", "--out", tmp_path, "--no-video")
+    assert imop(*task, *which) == 0
+    assert "instance 1 after 0" in capsys.readouterr().out
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert (result["instance"], result["shown"]) == (1, 0)
+    assert max(step["position_error"] for step in result["steps"]) < 1e-6
 
 
 def test_replay_fails_in_another_scene_with_exit_code_1(store, tmp_path):

@@ -52,6 +52,7 @@ def run(
     seed: int = 1,
     variation: int = 0,
     instance: int = 0,
+    shown: int | None = None,
     demo: Path | None = None,
     demo_episode: int = 0,
     method: str = "learned",
@@ -72,6 +73,7 @@ def run(
         seed: scene to perform the task in.
         variation: which variation of the task.
         instance: seed of the objects' shapes, sizes and colours.
+        shown: that of the demonstrated objects, if it shall show others of their kind.
         demo: store or folder of RLBench's layout with a demonstration; one is recorded if not given.
         demo_episode: which of its episodes.
         method: learned, routed, replay, registration, textbook, oracle (true object poses), or one's own,
@@ -84,21 +86,26 @@ def run(
     """
     from imop.demos.load import load_demonstration
     from imop.evaluation.run import perform, steps_table
-    from imop.evaluation.trials import Trial, demonstration_for
+    from imop.evaluation.trials import Trial, demonstration_for, require_instances
     from imop.tasks.changes import changes_of
     from imop.tasks.suites import find_task
 
     writable_folder(out)
     factors = ",".join(changes_of({task: find_task(task)}, change)[task])
-    trial = Trial(task, seed, variation, instance, factors)
+    trial = Trial(task, seed, variation, instance, factors, shown)
+    if shown is not None:
+        require_instances(task, "shown", f"{shown}", "nothing")
+        if demo is not None:
+            raise InvalidInput("shown", f"{shown} together with demo {demo}", "one of the two")
     with _status(f"recording one demonstration of {task}" if demo is None else f"reading {demo}"):
-        shown = demonstration_for(trial) if demo is None else load_demonstration(demo, demo_episode)
+        watched = demonstration_for(trial) if demo is None else load_demonstration(demo, demo_episode)
     with _status(f"performing {task} in scene {seed}"):
-        result = perform(trial, shown, method, out, min_confidence, video, weights)
+        result = perform(trial, watched, method, out, min_confidence, video, weights)
     console.print(steps_table(result))
-    changed = f", changed: {factors}" if factors else ""
+    scene = f"scene {seed}" + (f", instance {instance} after {shown}" if trial.other_things else "")
+    scene += f", changed: {factors}" if factors else ""
     console.print(
-        f"{task}, scene {seed}{changed}: {'success' if result.success else f'failed: {result.reason}'}",
+        f"{task}, {scene}: {'success' if result.success else f'failed: {result.reason}'}",
         style="green" if result.success else "red",
     )
     _list(out)

@@ -50,7 +50,7 @@ def test_an_extra_that_a_worker_misses_ends_the_run_and_is_no_failed_episode(eva
 
 def test_what_a_policy_cannot_handle_it_has_failed_at(evaluated):
     results, (episode,) = evaluated("Lost")
-    assert episode.success is False and "nothing to see" in episode.reason
+    assert episode.success is False and episode.error and "nothing to see" in episode.reason
     assert results.average("no_help:Lost") == 0
 
 

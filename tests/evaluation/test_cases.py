@@ -1,8 +1,14 @@
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.cases import CaseOptions, made, recorded_cases, simulated_cases
+from imop.evaluation.open_loop import ask
+from imop.evaluation.oracle import OraclePolicy
 from imop.evaluation.trials import Trial, suite_trials
+from imop.geometry.accuracy import FINE
 from imop.tasks.expert import ExpertFailed
 
 
@@ -26,6 +32,33 @@ def test_options_say_which_cases(tmp_path):
         CaseOptions(tasks="fly", cache=tmp_path).cases()
     with pytest.raises(InvalidInput):
         CaseOptions(demos=tmp_path).cases()
+
+
+def test_recordings_have_no_other_instances(tmp_path):
+    with pytest.raises(InvalidInput) as error:
+        CaseOptions(demos=tmp_path, instances="other").cases()
+    assert error.value.field == "instances"
+
+
+def test_queries_of_other_instances_have_the_appearance_of_their_own_objects(tmp_path):
+    options = CaseOptions(tasks="close_laptop", scenes=2, instances="other", cache=tmp_path)
+    (make_case,) = options.cases()
+    case = make_case()
+    assert case.demonstration.seeds["instance"] == 0
+    assert {name: query.seeds["instance"] for name, query in case.queries.items()} == {"0": 1, "1": 2}
+    assert set(case.others) == set(case.queries)
+    sizes = [look.model.geom_size for look in map(world_of, (case.appearance, *case.others.values()))]
+    assert not any(np.array_equal(sizes[0], other) for other in sizes[1:])
+    rows = list(ask("oracle", OraclePolicy, case))
+    assert rows and all(row.within(FINE) for row in rows)
+    # The recorded poses are others: the expert knows the new screens.
+    assert max(row.plain_position for row in rows) > FINE[0]
+    same = replace(case, others={})
+    assert not all(row.within(FINE) for row in ask("oracle", OraclePolicy, same))
+
+
+def world_of(appearance):
+    return appearance._world
 
 
 def asked(options):

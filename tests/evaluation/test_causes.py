@@ -10,6 +10,7 @@ from imop.evaluation.causes import Cause, _Acted, _first, diagnose, right_poses
 from imop.evaluation.rollout import Rollout, Step
 from imop.evaluation.trials import Trial, demonstration_for
 from imop.geometry import se3
+from imop.tasks.tabletop.close_laptop import CloseLaptop
 
 TRIAL = Trial("tabletop/stack_cubes", 3)
 
@@ -64,3 +65,13 @@ def test_replay_fails_because_it_goes_to_the_wrong_place(demonstration):
     found = diagnose(TRIAL, demonstration, "replay")
     assert found is not None and found.cause == Cause.MATCH and found.off[0] > 0.02
     assert found.panel is not None and np.isfinite(found.off).all()
+
+
+def test_poses_carried_over_to_another_laptop_are_right_and_those_of_another_place_are_not(monkeypatch):
+    trial = Trial("tabletop/close_laptop", 1, 0, 1, shown=0)
+    demonstration = demonstration_for(trial)
+    monkeypatch.setattr(CloseLaptop, "success", lambda *_: False)
+    found = diagnose(trial, demonstration, "oracle")
+    assert found is not None and found.cause in (Cause.PHYSICS, Cause.PLAN) and found.off[0] < 1e-6
+    replayed = diagnose(trial, demonstration, "replay")
+    assert replayed is not None and replayed.cause == Cause.MATCH and replayed.action == 0

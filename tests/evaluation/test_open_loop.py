@@ -132,6 +132,25 @@ def test_the_policy_is_asked_for_the_same_step_whatever_its_router_says(case):
     assert router.heard == [steps, "reset", *range(steps)]
 
 
+class Unnamed:
+    """What other objects look like, but not what cameras see them as part of."""
+
+    def __init__(self, appearance):
+        self.turns, self.alike = appearance.turns, appearance.alike
+
+    def instance(self, body):
+        raise AssertionError("regions lie on what was demonstrated")
+
+
+def test_regions_are_compared_with_the_demonstrated_objects_whatever_is_asked(case):
+    others = {name: Unnamed(case.appearance) for name in case.queries}
+    same, other = (
+        [row.region_iou for row in ask("one shot", lambda _: one_shot(), asked)]
+        for asked in (case, replace(case, others=others))
+    )
+    assert same == other and None not in same
+
+
 def test_what_is_not_found_is_a_miss_and_the_recording_goes_on(case):
     itself = replace(case, queries={"itself": case.demonstration})
     rows = list(ask("one shot", lambda _: one_shot(until=2), itself))

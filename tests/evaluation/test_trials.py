@@ -51,7 +51,7 @@ def test_other_instances_are_shown_one_and_tried_with_others():
     )
     assert [t.instance for t in same] == [2, 2, 2] and [t.seed for t in other] == [5, 6, 7]
     assert len({t.instance for t in other} | {2}) == 4
-    assert {t.shown_instance for t in (*same, *other)} == {2}
+    assert {t.demonstrated.instance for t in (*same, *other)} == {2}
     assert len({shown_together(t) for t in (*same, *other)}) == 1
     with pytest.raises(InvalidInput, match="rlbench") as error:
         suite_trials("rlbench", "all", ("open_drawer",), 1, 0, 0, other=True)
@@ -64,3 +64,14 @@ def test_the_oracle_carries_poses_over_to_another_rope():
     policy = OraclePolicy(env.world)
     policy.watch(demonstration_for(trial))
     assert rollout(env, policy, env.task.step_limit).success
+
+
+def test_a_demonstration_may_show_another_variation_and_the_scene_stays():
+    trial = Trial("tabletop/press_buttons", 3, 1, 4, shown=2, shown_variation=0)
+    shown = demonstration_for(trial)
+    assert (shown.variation, shown.seeds["instance"]) == (0, 2)
+    assert shown_together(trial) == shown_together(Trial("tabletop/press_buttons", 3, 0, 2))
+    plain = Trial("tabletop/press_buttons", 3, 1, 4)
+    assert plain.demonstrated == plain
+    poses = [t.env().world.pose("button0/body") for t in (trial, plain)]
+    assert (poses[0] == poses[1]).all()

@@ -1,5 +1,6 @@
 """Success rates of several methods on the same demonstrations and scenes."""
 
+from collections.abc import Iterable, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from imop.evaluation.methods import make_policy
 from imop.evaluation.report import Count, Instances, Results
 from imop.evaluation.rollout import rollout
 from imop.evaluation.trials import Trial, change_notes, demonstration_for, most_actions, suite_trials
-from imop.tasks.expert import perform
+from imop.tasks.expert import ExpertFailed, perform
 from imop.tasks.layout import NoRoom
 from imop.types import Demonstration
 
@@ -72,35 +73,47 @@ def evaluate_suite(
         CorruptData: if the log cannot be read.
     """
     trials = suite_trials(suite, split, tasks, episodes, seed, instance, change, instances == "other")
-    for method in methods:
-        if method not in ("oracle", "expert"):
-            make_policy(method, weights=weights)  # what is missing is said before anything is tried
-    known = EpisodeLog(log)
-    state = cache(lambda task, method: method_state(method, weights, task))
-    missing = [
-        (trial, method)
-        for of_task in trials.values()
-        for trial in of_task
-        for method in methods
-        if known.find(trial, method, state(trial.task, method)) is None
-    ]
-    shown = _demonstrations([trial for trial, _ in missing], jobs, console)
-    work = [
-        delayed(attempt)(trial, shown[shown_together(trial)], method, state(trial.task, method), weights)
-        for trial, method in missing
-    ]
-    for episode in parallel(work, jobs, console, "episodes"):
-        known.add(episode)
+    everything = [trial for of_task in trials.values() for trial in of_task]
+    found = tried(everything, methods, jobs, console, log, weights)
     counts = {
-        method: {
-            task: _count([known.find(trial, method, state(trial.task, method)) for trial in of_task])
-            for task, of_task in trials.items()
-        }
+        method: {task: count_of([found[trial, method] for trial in trials[task]]) for task in trials}
         for method in methods
     }
     names = ",".join(tasks) or split
     notes = (*NOTES, OTHER if instances == "other" else SAME, *change_notes(trials, change))
     return Results(suite, names, seed, counts, notes, change, instances)
+
+
+def tried(
+    trials: Sequence[Trial],
+    methods: Sequence[str],
+    jobs: int,
+    console: Console,
+    log: Path,
+    weights: Path | None = None,
+) -> dict[tuple[Trial, str], Episode]:
+    """The episode of every method in every scene: from the log, or tried now and added to it.
+
+    What the log has of other code or weights is tried again. For the arguments see `evaluate_suite`.
+
+    Raises:
+        InvalidInput: for an unknown task or method.
+        CorruptData: if the log cannot be read.
+        ExpertFailed, NoRoom: if there is no demonstration for a scene.
+    """
+    for method in methods:
+        if method not in ("oracle", "expert"):
+            make_policy(method, weights=weights)  # what is missing is said before anything is tried
+    known = EpisodeLog(log)
+    state = cache(lambda task, method: method_state(method, weights, task))
+    wanted = [(trial, method, state(trial.task, method)) for trial in trials for method in methods]
+    missing = [one for one in wanted if known.find(*one) is None]
+    shown = _demonstrations([trial for trial, _, _ in missing], jobs, console)
+    work = [delayed(attempt)(one[0], shown[shown_together(one[0])], *one[1:], weights) for one in missing]
+    for episode in parallel(work, jobs, console, "episodes"):
+        known.add(episode)
+    episodes = (known.find(*one) for one in wanted)
+    return {(episode.trial, episode.method): episode for episode in episodes if episode is not None}
 
 
 def attempt(
@@ -122,19 +135,21 @@ def attempt(
         raise  # says nothing about the method
     except ImopError as error:
         # What a policy cannot handle it has failed at; the other methods and scenes go on.
-        return Episode(trial, method, state, False, str(error))
+        return Episode(trial, method, state, False, str(error), error=not isinstance(error, ExpertFailed))
     decisions = tuple((step.generator, step.confidence) for step in result.steps)
     return Episode(trial, method, state, result.success, result.reason, len(result.steps), decisions)
 
 
-def _count(episodes: list[Episode | None]) -> Count:
-    tried = [episode.success for episode in episodes if episode and episode.success is not None]
-    return Count(sum(tried), len(tried))
+def count_of(episodes: Iterable[Episode]) -> Count:
+    """Successes among those episodes that had a scene."""
+    known = [episode.success for episode in episodes if episode.success is not None]
+    return Count(sum(known), len(known))
 
 
 def shown_together(trial: Trial) -> tuple[str, int, int, str]:
     """What trials with the same demonstration have in common."""
-    return trial.task, trial.variation, trial.shown_instance, trial.change
+    shown = trial.demonstrated
+    return shown.task, shown.variation, shown.instance, shown.change
 
 
 def _demonstrations(

@@ -11,6 +11,7 @@ from imop.errors import InvalidInput
 from imop.evaluation.appearance import Appearance
 from imop.evaluation.open_loop import Case
 from imop.evaluation.recordings import Recordings, objects_world
+from imop.evaluation.report import Instances
 from imop.evaluation.trials import Trial, suite_trials
 from imop.files import user_cache
 from imop.tasks.expert import ExpertFailed
@@ -28,7 +29,8 @@ class CaseOptions:
         demos: a folder in RLBench's layout instead of a suite: an episode, a task, or several tasks.
         scenes: per task, with its variations in turn.
         seed: of the first scene.
-        instance: seed of the objects.
+        instance: seed of the demonstrated objects.
+        instances: whether the scenes of a suite show the same objects, or in each scene others of their kind.
         cache: where recorded scenes are kept.
     """
 
@@ -39,6 +41,7 @@ class CaseOptions:
     scenes: int = 3
     seed: int = 0
     instance: int = 0
+    instances: Instances = "same"
     cache: Path = field(default_factory=user_cache)
 
     def cases(self) -> list[Callable[[], Case]]:
@@ -49,8 +52,10 @@ class CaseOptions:
         """
         if self.demos is None:
             tasks = tuple(filter(None, self.tasks.split(",")))
-            trials = suite_trials(self.suite, self.split, tasks, self.scenes, self.seed, self.instance)
-            return simulated_cases(trials, self.cache)
+            which = self.suite, self.split, tasks, self.scenes, self.seed, self.instance
+            return simulated_cases(suite_trials(*which, other=self.instances == "other"), self.cache)
+        if self.instances == "other":
+            raise InvalidInput("instances", "other in recordings", "same, or a suite instead of demos")
         cases = recorded_cases(self.demos)
         if not cases:
             raise InvalidInput("demos", f"{self.demos}", "at least two episodes of one task and variation")
@@ -104,5 +109,6 @@ def _simulated_case(task: str, trials: list[Trial], cache: Path) -> Case:
     shown = recordings.demonstration(trials[0])
     scenes = {str(trial.seed): recordings.scene(trial) for trial in trials}
     queries = {name: scene for name, scene in scenes.items() if scene is not None}
-    appearance = Appearance(objects_world(trials[0]))
-    return Case(task, str(shown.seeds["episode"]), shown, queries, appearance)
+    appearance = Appearance(objects_world(trials[0].demonstrated))
+    others = {str(t.seed): Appearance(objects_world(t)) for t in trials if t.other_things}
+    return Case(task, str(shown.seeds["episode"]), shown, queries, appearance, others)

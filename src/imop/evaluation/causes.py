@@ -2,8 +2,9 @@
 
 The episode is acted again while the simulator is asked where things are; only the evaluation may. Right is
 the demonstrated pose, carried over by the true pose of the object or of an equal one, after any turn that
-cannot be seen (`equal_poses`). A pose may be wrong by this measure and do all the same: the first wrong
-action is where to look first, not always the culprit.
+cannot be seen (`equal_poses`); where other things were demonstrated, the expert's pose is right, too. A pose
+may be wrong by this measure and do all the same: the first wrong action is where to look first, not always
+the culprit.
 """
 
 from dataclasses import dataclass
@@ -14,9 +15,11 @@ import numpy as np
 
 from imop.evaluation.appearance import Appearance
 from imop.evaluation.equal_poses import equal_poses
+from imop.evaluation.expert_poses import ExpertPoses
 from imop.evaluation.methods import make_policy
 from imop.evaluation.open_loop import region_shares
 from imop.evaluation.picture import Panel
+from imop.evaluation.recordings import objects_world
 from imop.evaluation.rollout import Rollout, rollout
 from imop.evaluation.trials import Trial, most_actions
 from imop.geometry import se3
@@ -94,16 +97,22 @@ def diagnose(
     """
     env = trial.env()
     policy = make_policy(method, env.world, weights=weights)
-    policy.watch(demonstration.stripped())
+    policy.watch(demonstration if method == "oracle" else demonstration.stripped())
     appearance = Appearance(env.world)
+    in_demonstration = Appearance(objects_world(trial.demonstrated)) if trial.other_things else appearance
+    expert = ExpertPoses(env.task, env.world, lambda: env.observation, appearance, demonstration)
     acted: list[_Acted] = []
 
     def on_action(observation: Observation, action: Action) -> None:
         step = action.match.step if action.match else len(acted)
-        off = errors(action.T_world_gripper, right_poses(demonstration, step, env.world, appearance))
+        right = expert(step) if trial.other_things else None
+        if right is None:
+            right = right_poses(demonstration, step, env.world, appearance)
+        expert.took(step, action)
+        off = errors(action.T_world_gripper, right)
         keyframe = demonstration.keyframes[step]
         panel = Panel(keyframe, observation, action, f"{trial.task} seed {trial.seed} step {step}")
-        acted.append(_Acted(step, off, _on_object(demonstration, action, step, appearance), panel))
+        acted.append(_Acted(step, off, _on_object(demonstration, action, step, in_demonstration), panel))
 
     result = rollout(env, policy, most_actions(method, demonstration, env.task), on_action=on_action)
     return None if result.success else _first(acted, result)

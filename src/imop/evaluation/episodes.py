@@ -35,6 +35,7 @@ class Episode:
         reason: why the episode ended.
         actions: how many were taken.
         decisions: who proposed each action, and with which probability of being right.
+        error: whether it ended because something could not be handled, which counts as a failure.
     """
 
     trial: Trial
@@ -44,6 +45,7 @@ class Episode:
     reason: str
     actions: int = 0
     decisions: tuple[tuple[str, float], ...] = ()
+    error: bool = False
 
 
 class EpisodeLog:

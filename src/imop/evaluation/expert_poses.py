@@ -17,11 +17,20 @@ class ExpertPoses:
         task: built in `world`.
         world: the scene as the episode goes on.
         observe: what is seen of it now.
-        appearance: of the task's objects.
+        appearance: of the objects in `world`.
+        shown: what was demonstrated, if it was with others of their kind: then its poses are right, too.
     """
 
-    def __init__(self, task: Task, world: World, observe: Callable[[], Observation], appearance: Appearance):
+    def __init__(
+        self,
+        task: Task,
+        world: World,
+        observe: Callable[[], Observation],
+        appearance: Appearance,
+        shown: Demonstration | None = None,
+    ):
         self._task, self._world, self._observe, self._appearance = task, world, observe, appearance
+        self._shown = shown
         self._taken: dict[int, Keyframe] = {}
 
     def __call__(self, step: int) -> FloatArray | None:
@@ -33,7 +42,7 @@ class ExpertPoses:
         for number, keyframe in self._taken.items():
             if number < step:
                 steps[number] = keyframe
-        return equal_poses(Demonstration(tuple(steps), observation), step, self._appearance)
+        return equal_poses(Demonstration(tuple(steps), observation), step, self._appearance, self._shown)
 
     def took(self, step: int, action: Action) -> None:
         """The policy is about to act for a step; what it grasps lies in the hand as it did there."""

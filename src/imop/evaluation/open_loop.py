@@ -5,8 +5,8 @@ choosing the right step are measured apart; which poses are right is said in `eq
 """
 
 import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -87,8 +87,9 @@ class Case:
         task: its name in the report.
         support: name of the demonstration in the report.
         demonstration: with privileged names and poses, if there are any.
-        queries: recordings of the same task, variation and objects by their names in the report.
-        appearance: of the objects; None if it is unknown, then only recorded poses are right.
+        queries: recordings of the same task and variation by their names in the report.
+        appearance: of the demonstrated objects; None if it is unknown, then only recorded poses are right.
+        others: appearances of the objects of those queries that show others than the demonstration.
     """
 
     task: str
@@ -96,6 +97,14 @@ class Case:
     demonstration: Demonstration
     queries: dict[str, Demonstration]
     appearance: Appearance | None = None
+    others: Mapping[str, Appearance] = field(default_factory=dict)
+
+    def right_poses(self, query: str, step: int) -> FloatArray:
+        """(N, 4, 4) T_world_gripper that are right for a step of a query, the recorded one first."""
+        other = self.others.get(query)
+        if other is None:
+            return equal_poses(self.queries[query], step, self.appearance)
+        return equal_poses(self.queries[query], step, other, self.demonstration)
 
 
 OnRow = Callable[[Row, Case, Action | None], None]
@@ -146,7 +155,7 @@ def _answer(
     if told:
         told.step = step
     row = Row(method, case.task, recorded.variation, case.support, query, step, keyframe.object_name)
-    right = equal_poses(recorded, step, case.appearance)
+    right = case.right_poses(query, step)
     row = replace(row, repeatable=_repeats(case.demonstration.keyframes[step], keyframe, right))
     action = None
     started = time.perf_counter()

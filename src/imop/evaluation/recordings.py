@@ -49,7 +49,8 @@ class Recordings:
 
     def scene(self, trial: Trial) -> Demonstration | None:
         """What the expert does in the trial's scene; None if it fails there."""
-        trial = replace(trial, shown=None)  # what was demonstrated does not change the scene
+        # What was demonstrated does not change the scene.
+        trial = replace(trial, shown=None, shown_variation=None)
         if trial in self._numbers:
             return self._store[self._numbers[trial]]
         failure = self._failed / "-".join(re.sub(r"\W", "_", str(v)) for v in asdict(trial).values())
@@ -66,12 +67,13 @@ class Recordings:
         return self._kept(recorded)
 
     def demonstration(self, trial: Trial) -> Demonstration:
-        """The demonstration of the trial's task, variation and objects, see `trials.demonstration_for`.
+        """The demonstration of the trial's task, shown variation and objects, see `demonstration_for`.
 
         Raises:
             ExpertFailed, NoRoom: as `demonstration_for`.
         """
-        wanted = (trial.task, trial.variation, trial.shown_instance)
+        shown = trial.demonstrated
+        wanted = (shown.task, shown.variation, shown.instance)
         for known, number in self._numbers.items():
             if known.seed >= DEMONSTRATION_SEED and (known.task, known.variation, known.instance) == wanted:
                 return self._store[number]

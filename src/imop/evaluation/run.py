@@ -64,7 +64,9 @@ def perform(
     panels: list[Panel] = []
 
     appearance = Appearance(objects_world(trial))
-    expert = ExpertPoses(env.task, env.world, lambda: env.observation, appearance)
+    other = demonstration.seeds.get("instance", trial.instance) != trial.instance
+    shown = demonstration if other else None
+    expert = ExpertPoses(env.task, env.world, lambda: env.observation, appearance, shown)
 
     def on_action(observation: Observation, action: Action) -> None:
         step = action.match.step if action.match else len(panels)

@@ -31,6 +31,7 @@ class Trial:
         instance: seed of shapes, sizes and colours.
         change: names of `tasks.changes.FACTORS`, joined by commas; what the scene differs in.
         shown: that of the demonstration; None if it is the same.
+        shown_variation: of the task in the demonstration; None if it is the same.
 
     Raises:
         InvalidInput: for a negative seed, or an unknown change.
@@ -42,6 +43,7 @@ class Trial:
     instance: int = 0
     change: str = ""
     shown: int | None = None
+    shown_variation: int | None = None
 
     def __post_init__(self) -> None:
         for name in ("seed", "instance", "shown"):
@@ -52,16 +54,25 @@ class Trial:
     @cached_property
     def changed(self) -> Change:
         """What the scene, and what is seen of it, differs in."""
-        return Change.of(self.change, self.task, self.variation, self.shown_instance, self.seed)
+        shown = self.demonstrated
+        return Change.of(self.change, self.task, shown.variation, shown.instance, self.seed)
 
     def make_task(self) -> Task:
         """The task, its things at their size in the scene."""
         return self.changed.of_size(make_task(self.task))
 
     @property
-    def shown_instance(self) -> int:
-        """Seed of the objects of the demonstration."""
-        return self.instance if self.shown is None else self.shown
+    def demonstrated(self) -> "Trial":
+        """The trial as it would be with the things and the aim of the demonstration."""
+        instance = self.instance if self.shown is None else self.shown
+        variation = self.variation if self.shown_variation is None else self.shown_variation
+        return replace(self, instance=instance, variation=variation, shown=None, shown_variation=None)
+
+    @property
+    def other_things(self) -> bool:
+        """Whether the scene has other things than the demonstration."""
+        shown = self.demonstrated
+        return (shown.variation, shown.instance) != (self.variation, self.instance)
 
     def env(self) -> ImopEnv:
         """The environment, reset to this scene.
@@ -77,7 +88,7 @@ class Trial:
 
 
 def demonstration_for(trial: Trial) -> Demonstration:
-    """One demonstration of the trial's task, variation and shown instance, in a scene that is never tested.
+    """One demonstration of the trial's task, shown variation and instance, in a scene that is never tested.
 
     The trial's change of the scene does not apply to it, but that of the set-up does.
 
@@ -85,10 +96,10 @@ def demonstration_for(trial: Trial) -> Demonstration:
         ExpertFailed: if the expert succeeds in none of the scenes it may choose from.
         NoRoom: if not even a scene was found.
     """
-    task = make_task(trial.task)
+    task, shown = make_task(trial.task), trial.demonstrated
     for seed in range(DEMONSTRATION_SEED, DEMONSTRATION_SEED + _RECORDING_ATTEMPTS):
         try:
-            recorded = record_demonstration(task, seed, trial.variation, trial.shown_instance)
+            recorded = record_demonstration(task, seed, shown.variation, shown.instance)
             return _seen(recorded, trial.changed.shown)
         except (ExpertFailed, NoRoom) as error:
             failure: ImopError = error
@@ -126,8 +137,9 @@ def suite_trials(
         problem = f"{episodes} scenes from {seed} on"
         raise InvalidInput("seed", problem, f"scenes below {DEMONSTRATION_SEED}, where demonstrations begin")
     kinds = {name: find_task(name) for name in chosen_tasks(suite, split, tasks)}
-    if single := [name for name, kind in kinds.items() if other and kind.one_instance]:
-        raise InvalidInput("instances", f"other, but {single[0]} has one instance of its things", "same")
+    if other:
+        for name in kinds:
+            require_instances(name, "instances", "other", "same")
     changes = changes_of(kinds, change)
     return {
         name.removeprefix(f"{suite}/"): [
@@ -144,6 +156,16 @@ def suite_trials(
         for name, kind in kinds.items()
         if changes[name] or not change
     }
+
+
+def require_instances(task: str, field: str, value: str, accepted: str) -> None:
+    """Refuse a value that asks for another instance of the things of a task.
+
+    Raises:
+        InvalidInput: if the task has one instance only, or there is no such task.
+    """
+    if find_task(task).one_instance:
+        raise InvalidInput(field, f"{value}, but {task} has one instance of its things", accepted)
 
 
 def change_notes(trials: Mapping[str, Sequence[Trial]], change: str) -> list[str]:
