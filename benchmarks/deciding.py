@@ -27,8 +27,8 @@ from imop.errors import ImopError, InvalidInput, NoConfidentMatch
 from imop.evaluation.cases import CaseOptions, made
 from imop.evaluation.methods import make_policy
 from imop.evaluation.open_loop import Case
+from imop.evaluation.told import Told
 from imop.files import replaced
-from imop.policy.interfaces import BEGINNING, Progress
 from imop.policy.one_shot import OneShotPolicy
 
 
@@ -65,23 +65,23 @@ class Times:
 def decisions(case: Case, methods: list[str]) -> Iterator[Times]:
     """Every method asked for every step of every scene, told which step it is."""
     shown = case.demonstration
-    policies: dict[str, OneShotPolicy] = {}
+    policies: dict[str, Told] = {}
     for method in methods:
         policy = make_policy(method)
         if not isinstance(policy, OneShotPolicy):
             raise InvalidInput("methods", method, "methods that look at images")
         policy.watch(shown.stripped())
-        policies[method] = policy
+        policies[method] = Told(policy)
     for query, recorded in case.queries.items():
-        progress = dict.fromkeys(methods, BEGINNING)
+        for policy in policies.values():
+            policy.reset()
         for step in range(min(len(shown), len(recorded))):
             observation = recorded.keyframes[step].observation.stripped()
             taken = {}
             for method, policy in policies.items():
                 started = time.perf_counter()
                 with suppress(NoConfidentMatch):
-                    action = policy.locate(policy.see(observation), step, progress=progress[method])
-                    progress[method] = Progress(action.match.T_query_support)
+                    policy.act(observation, step)
                 taken[method] = 1000 * (time.perf_counter() - started)
             yield Times(case.task, query, step, taken)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from imop.evaluation.appearance import Appearance
-from imop.evaluation.open_loop import Case, ToldRouter, ask, region_iou
+from imop.evaluation.open_loop import Case, ask, region_iou
 from imop.evaluation.oracle import OraclePolicy
 from imop.evaluation.recordings import objects_world
 from imop.evaluation.replay import ReplayPolicy
@@ -157,12 +157,6 @@ def test_what_is_not_found_is_a_miss_and_the_recording_goes_on(case):
     assert [row.within(FINE) for row in rows[:3]] == [True, True, False]
     assert all(row.problem and row.position is None for row in rows[2:])
     assert [row.routed for row in rows] == list(range(len(rows)))
-
-
-def test_a_told_router_answers_what_it_was_told():
-    told = ToldRouter(AlwaysFirst())
-    told.step = 3
-    assert told.route(None) == (0, 3) and told.chosen == 0
 
 
 def test_the_overlap_of_a_region_with_an_object(recorded):

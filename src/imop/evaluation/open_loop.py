@@ -1,11 +1,11 @@
 """Prediction on recorded data: what would the policy have done in each recorded state?
 
-`predict` lets the policy choose the step itself. `ask` tells it the step, so that finding the right pose and
-choosing the right step are measured apart; which poses are right is said in `equal_poses`.
+`predict` lets the policy choose the step itself. `ask` tells it the step (`told.py`), so that finding the
+right pose and choosing the right step are measured apart; which poses are right is said in `equal_poses`.
 """
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,54 +16,19 @@ from imop.evaluation.equal_poses import equal_poses
 from imop.evaluation.methods import Policy
 from imop.evaluation.open_loop_rows import Row
 from imop.evaluation.oracle import OraclePolicy
+from imop.evaluation.told import Told
 from imop.geometry import cloud as clouds
 from imop.geometry import se3
 from imop.geometry.accuracy import COARSE, errors
 from imop.geometry.neighbours import nearest, within
 from imop.geometry.perception import WORKSPACE_LOWER, WORKSPACE_UPPER
-from imop.policy.interfaces import Scene, Transition
 from imop.policy.one_shot import OneShotPolicy
-from imop.policy.router import Router
 from imop.types import Action, Demonstration, FloatArray, Keyframe, Observation
 
 THINNED = 0.005
 """Metres between the points that regions are compared on."""
 COVERED = 0.01
 """A point of the object is in the region if the region has a point this near, metres."""
-
-
-class ToldRouter:
-    """Chooses the step it was told and notes what another router would have chosen.
-
-    Attributes:
-        step: what it was told.
-        chosen: what the other router chose last.
-    """
-
-    def __init__(self, router: Router) -> None:
-        self._router = router
-        self.step = 0
-        self.chosen: int | None = None
-
-    def watch(self, steps: Sequence[Transition]) -> None:
-        """The other router takes note."""
-        self._router.watch(steps)
-
-    def reset(self) -> None:
-        """A new episode begins."""
-        self._router.reset()
-
-    def route(self, query: Scene) -> tuple[int, int]:
-        """The step it was told, of the first demonstration."""
-        self.chosen = self._router.route(query)[1]
-        return 0, self.step
-
-    def took(self, demonstration: int, step: int) -> None:
-        """Nothing: the recording goes on whether or not the step was found; see `go_on`."""
-
-    def go_on(self) -> None:
-        """The step it was told has been performed."""
-        self._router.took(0, self.step)
 
 
 class RecordedPoses:
@@ -126,17 +91,15 @@ def ask(
     """
     poses = RecordedPoses()
     policy = make(poses)
-    told = None
-    if isinstance(policy, OneShotPolicy):
-        told = policy.router = ToldRouter(policy.router)
     shown = case.demonstration
     policy.watch(shown if isinstance(policy, OraclePolicy) else shown.stripped())
+    asked = Told(policy) if isinstance(policy, OneShotPolicy) else policy
     overlaps: dict[int, float | None] = {}
     for query, recorded in case.queries.items():
-        policy.reset()
+        asked.reset()
         for step in range(min(len(shown), len(recorded))):
             poses.keyframe = recorded.keyframes[step]
-            action, row = _answer(method, policy, told, case, query, step)
+            action, row = _answer(method, asked, case, query, step)
             if action and action.match and step not in overlaps:
                 overlaps[step] = _overlap(case, step, action.match.region)
             row = replace(row, region_iou=overlaps.get(step))
@@ -146,27 +109,24 @@ def ask(
 
 
 def _answer(
-    method: str, policy: Policy, told: ToldRouter | None, case: Case, query: str, step: int
+    method: str, asked: Policy | Told, case: Case, query: str, step: int
 ) -> tuple[Action | None, Row]:
     """What the policy answers, and the row that follows from it."""
     recorded = case.queries[query]
     keyframe = recorded.keyframes[step]
     observation = keyframe.observation.stripped()
-    if told:
-        told.step = step
     row = Row(method, case.task, recorded.variation, case.support, query, step, keyframe.object_name)
     right = case.right_poses(query, step)
     row = replace(row, repeatable=_repeats(case.demonstration.keyframes[step], keyframe, right))
     action = None
     started = time.perf_counter()
     try:
-        action = policy.act(observation)
+        action = asked.act(observation, step) if isinstance(asked, Told) else asked.act(observation)
     except NoConfidentMatch as error:
         row = replace(row, problem=str(error))
     row = replace(row, milliseconds=1000 * (time.perf_counter() - started))
-    if told:
-        told.go_on()
-        row = replace(row, routed=told.chosen)
+    if isinstance(asked, Told):
+        row = replace(row, routed=asked.routed)
     return action, _compared(row, action, right) if action else row
 
 
