@@ -43,6 +43,7 @@ class Options:
         weights: of the learned policy; by default the bundled ones.
         groceries: comma-separated names; all nine by default.
         trials: scenes per cell.
+        focus: whether somebody points at the grocery, in demonstration and scene, until it is grasped.
         diagonal: only the cells where the same grocery is shown and tried.
         first: seed of the first scene.
         out: folder of results.json, report.md and episodes.jsonl.
@@ -53,6 +54,7 @@ class Options:
     weights: Path | None = None
     groceries: str = ",".join(NAMES)
     trials: int = 10
+    focus: bool = False
     diagonal: bool = False
     first: int = 0
     out: Path = Path("runs/cross_object")
@@ -88,7 +90,7 @@ def measure(options: Options, console: Console) -> Cells:
     }
     everything = [trial for of_cell in trials.values() for trial in of_cell]
     log, method = options.out / "episodes.jsonl", options.method
-    found = tried(everything, [method], options.jobs, console, log, options.weights)
+    found = tried(everything, [method], options.jobs, console, log, options.weights, options.focus)
     return {cell: [found[trial, method] for trial in of_cell] for cell, of_cell in trials.items()}
 
 

@@ -3,8 +3,9 @@ from joblib.externals.loky import get_reusable_executor
 from rich.console import Console
 
 from imop.errors import InvalidInput, MissingExtra
-from imop.evaluation.benchmark import evaluate_suite
+from imop.evaluation.benchmark import evaluate_suite, tried
 from imop.evaluation.episodes import read_episodes
+from imop.evaluation.trials import Trial
 
 MODULE = """
 from imop.errors import InvalidInput, MissingExtra
@@ -58,3 +59,12 @@ def test_what_a_policy_cannot_handle_it_has_failed_at(evaluated):
 def test_less_than_one_process_is_refused(evaluated, jobs):
     with pytest.raises(InvalidInput, match="jobs"):
         evaluated("Lost", jobs)
+
+
+@pytest.mark.parametrize("method", ["replay", "oracle"])
+def test_nobody_points_out_things_to_what_does_not_look(method, tmp_path):
+    with pytest.raises(InvalidInput) as error:
+        tried(
+            [Trial("tabletop/lid_off_pot", 0)], [method], 1, Console(quiet=True), tmp_path / "log", focus=True
+        )
+    assert error.value.field == "focus" and not (tmp_path / "log").exists()

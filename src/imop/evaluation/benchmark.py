@@ -7,13 +7,15 @@ from pathlib import Path
 from joblib import delayed
 from rich.console import Console
 
-from imop.errors import AssetMissing, ImopError, MissingExtra
+from imop.errors import AssetMissing, ImopError, InvalidInput, MissingExtra
 from imop.evaluation.episodes import Episode, EpisodeLog, method_state
 from imop.evaluation.jobs import parallel
 from imop.evaluation.methods import make_policy
+from imop.evaluation.pointing import pointing
 from imop.evaluation.report import Count, Instances, Results
 from imop.evaluation.rollout import rollout
 from imop.evaluation.trials import Trial, change_notes, demonstration_for, most_actions, suite_trials
+from imop.policy.one_shot import OneShotPolicy
 from imop.tasks.expert import ExpertFailed, perform
 from imop.tasks.layout import NoRoom
 from imop.types import Demonstration
@@ -91,25 +93,31 @@ def tried(
     console: Console,
     log: Path,
     weights: Path | None = None,
+    focus: bool = False,
 ) -> dict[tuple[Trial, str], Episode]:
     """The episode of every method in every scene: from the log, or tried now and added to it.
 
-    What the log has of other code or weights is tried again. For the arguments see `evaluate_suite`.
+    What the log has of other code or weights is tried again. If `focus`, somebody points at the thing that is
+    acted on first, in demonstration and scene. For the other arguments see `evaluate_suite`.
 
     Raises:
-        InvalidInput: for an unknown task or method.
+        InvalidInput: for an unknown task or method, or one that nobody can point out things to.
         CorruptData: if the log cannot be read.
         ExpertFailed, NoRoom: if there is no demonstration for a scene.
     """
     for method in methods:
         if method not in ("oracle", "expert"):
-            make_policy(method, weights=weights)  # what is missing is said before anything is tried
+            policy = make_policy(method, weights=weights)  # what is missing is said before anything is tried
+        if focus and (method in ("oracle", "expert") or not isinstance(policy, OneShotPolicy)):
+            raise InvalidInput("focus", f"{method} takes none", "learned, routed, registration, textbook")
     known = EpisodeLog(log)
-    state = cache(lambda task, method: method_state(method, weights, task))
+    state = cache(lambda task, method: method_state(method, weights, task) + ("-focus" if focus else ""))
     wanted = [(trial, method, state(trial.task, method)) for trial in trials for method in methods]
     missing = [one for one in wanted if known.find(*one) is None]
     shown = _demonstrations([trial for trial, _, _ in missing], jobs, console)
-    work = [delayed(attempt)(one[0], shown[shown_together(one[0])], *one[1:], weights) for one in missing]
+    work = [
+        delayed(attempt)(one[0], shown[shown_together(one[0])], *one[1:], weights, focus) for one in missing
+    ]
     for episode in parallel(work, jobs, console, "episodes"):
         known.add(episode)
     episodes = (known.find(*one) for one in wanted)
@@ -117,9 +125,14 @@ def tried(
 
 
 def attempt(
-    trial: Trial, demonstration: Demonstration, method: str, state: str, weights: Path | None = None
+    trial: Trial,
+    demonstration: Demonstration,
+    method: str,
+    state: str,
+    weights: Path | None = None,
+    focus: bool = False,
 ) -> Episode:
-    """How a method that was shown the demonstration does in one scene."""
+    """How a method that was shown the demonstration does in one scene; for the arguments see `tried`."""
     try:
         env = trial.env()
     except NoRoom as error:
@@ -129,8 +142,14 @@ def attempt(
             perform(env.task, env.world)
             return Episode(trial, method, state, True, "success", len(demonstration))
         policy = make_policy(method, env.world, weights=weights)
-        policy.watch(demonstration if method == "oracle" else demonstration.stripped())
-        result = rollout(env, policy, most_actions(method, demonstration, env.task))
+        point = pointing(demonstration) if focus else None
+        if point is not None:
+            assert isinstance(policy, OneShotPolicy)
+            meant = point(0, demonstration.keyframes[0].observation)
+            policy.watch(demonstration.stripped(), meant)
+        else:
+            policy.watch(demonstration if method == "oracle" else demonstration.stripped())
+        result = rollout(env, policy, most_actions(method, demonstration, env.task), point=point)
     except (MissingExtra, AssetMissing):
         raise  # says nothing about the method
     except ImopError as error:

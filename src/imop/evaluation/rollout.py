@@ -6,7 +6,9 @@ from dataclasses import asdict, dataclass
 
 from imop.errors import NoConfidentMatch
 from imop.evaluation.methods import Policy
+from imop.evaluation.pointing import Pointing
 from imop.geometry.accuracy import errors
+from imop.policy.one_shot import OneShotPolicy
 from imop.tasks.env import ImopEnv, to_array
 from imop.types import Action, FloatArray, Observation
 
@@ -58,6 +60,7 @@ def rollout(
     steps: int,
     expert_poses: Callable[[int], FloatArray | None] = lambda step: None,
     on_action: Callable[[Observation, Action], None] = lambda observation, action: None,
+    point: Pointing | None = None,
 ) -> Rollout:
     """Act until success, failure or `steps` actions, in an environment that was just reset.
 
@@ -68,6 +71,7 @@ def rollout(
         expert_poses: (N, 4, 4) T_world_gripper that are right for the step of the given number, from the
             state now.
         on_action: called before each action is executed.
+        point: tells a one-shot policy which thing is meant; by default nobody does.
     """
     policy.reset()
     taken: list[Step] = []
@@ -75,7 +79,11 @@ def rollout(
         observation = env.observation.stripped()
         started = time.perf_counter()
         try:
-            action = policy.act(observation)
+            if point is None:
+                action = policy.act(observation)
+            else:
+                assert isinstance(policy, OneShotPolicy)
+                action = policy.act(observation, point(number, env.observation))
         except NoConfidentMatch:
             return Rollout(False, "no confident match", tuple(taken))
         decided = time.perf_counter()
