@@ -6,10 +6,11 @@ Every generator is left out alone. The policy is told the step and asked for it 
 demonstrated things and with other instances of them; its own answer is passed on to the next step. A pose is
 right within 2 cm and 10 degrees of one that is as right as the recorded one (`evaluation/equal_poses.py`).
 
-Intervals are Wilson's. That of a difference is of the share of losses among the poses that are right only
-with or only without the generator: the others say nothing about it.
+Intervals are Wilson's. A generator brings the poses that are lost without it less those that are won; the
+intervals of both shares make that of the difference (Newcombe, Statistics in Medicine 1998).
 """
 
+import math
 import shlex
 import sys
 from collections.abc import Iterator, Sequence
@@ -209,20 +210,29 @@ def groups(options: Options) -> list[list[Trial]]:
 def share(right: Sequence[bool]) -> dict[str, object]:
     """How often it was right."""
     count, n = sum(right), len(right)
-    return {"right": count, "n": n, "share": count / max(n, 1), "interval": wilson(count, n)}
+    return {"right": count, "n": n, "share": count / n, "interval": wilson(count, n)}
 
 
 def difference(full: Sequence[bool], less: Sequence[bool]) -> dict[str, object]:
     """What the share of right answers gains by a generator, from the same steps with and without it."""
-    n = max(len(full), 1)
+    n = len(full)
     lost = sum(a and not b for a, b in zip(full, less, strict=True))
     won = sum(b and not a for a, b in zip(full, less, strict=True))
-    low, high = ((2 * end - 1) * (lost + won) / n for end in wilson(lost, lost + won))
-    return {"lost": lost, "won": won, "difference": (lost - won) / n, "interval": (low, high)}
+    (lost_low, lost_high), (won_low, won_high) = wilson(lost, n), wilson(won, n)
+    gain = (lost - won) / n
+    low = gain - math.hypot(lost / n - lost_low, won_high - won / n)
+    high = gain + math.hypot(lost_high - lost / n, won / n - won_low)
+    return {"lost": lost, "won": won, "difference": gain, "interval": (low, high)}
 
 
 def summary(rows: Sequence[Row]) -> dict[str, dict[str, dict[str, object]]]:
-    """For each generator that was left out (empty: none): same and other things, and what it brings."""
+    """For each generator that was left out (empty: none): same and other things, and what it brings.
+
+    Raises:
+        InvalidInput: if there are no scenes with the same things, or none with others.
+    """
+    if len({row.other for row in rows}) < 2:
+        raise InvalidInput("scenes", "the expert fails in all with the same or with other things", "more")
     order = sorted(rows, key=lambda r: (r.other, r.task, r.variation, r.scene, r.step))
     full = [row.right for row in order if not row.without]
     found = {}
@@ -264,10 +274,10 @@ def main() -> int:
     try:
         work = [delayed(task_rows)(trials, options.weights, options.cache) for trials in groups(options)]
         rows = [row for some in parallel(work, options.jobs, console, "demonstrations") for row in some]
+        found = summary(rows)
     except ImopError as error:
         console.print(f"[red]{error}")
         return 2
-    found = summary(rows)
     print(markdown(found))
     if options.json:
         command = shlex.join(["python", *sys.argv])

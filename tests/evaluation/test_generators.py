@@ -39,12 +39,27 @@ def test_a_generator_brings_what_is_lost_without_it_less_what_is_won():
     full, less = [True] * 6 + [False] * 4, [True] * 3 + [False] * 6 + [True]
     d = difference(full, less)
     assert (d["lost"], d["won"], d["difference"]) == (3, 1, pytest.approx(0.2))
-    low, high = wilson(3, 4)
-    assert d["interval"] == pytest.approx(((2 * low - 1) * 0.4, (2 * high - 1) * 0.4))
+    low, high = d["interval"]
+    assert low < 0 < 0.2 < high
 
 
-def test_a_generator_that_changes_nothing_brings_nothing_for_sure():
-    assert difference([True, False], [True, False])["interval"] == (0, 0)
+def test_what_a_generator_brings_is_the_less_certain_the_fewer_were_asked():
+    few, many = (difference([True, False] * n, [True, False] * n)["interval"] for n in (5, 50))
+    assert few == pytest.approx((-wilson(0, 10)[1], wilson(0, 10)[1]))
+    assert many == pytest.approx((-wilson(0, 100)[1], wilson(0, 100)[1]))
+
+
+def test_losses_and_gains_are_mirror_images():
+    full, less = [True] * 5 + [False] * 5, [False] * 4 + [True] * 2 + [False] * 4
+    (low, high), (back_low, back_high) = (
+        difference(a, b)["interval"] for a, b in ((full, less), (less, full))
+    )
+    assert (low, high) == pytest.approx((-back_high, -back_low))
+
+
+def test_without_other_things_there_is_nothing_to_compare():
+    with pytest.raises(InvalidInput, match="scenes"):
+        summary([row for without in CONFIGURATIONS for row in rows([True], without)])
 
 
 def test_same_and_other_things_are_told_apart_and_compared_step_by_step():

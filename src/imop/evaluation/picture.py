@@ -25,6 +25,8 @@ REGION_COLOR = "#12a150"
 MATCH_COLOR = "#d62728"
 GRIPPER_COLOR = "#1f3fbf"
 MAX_LINES = 60
+# Metres between the points of a scene as drawn.
+SPACING = 0.006
 # Distance (metres) between the two scenes as drawn.
 GAP = 1.3
 
@@ -96,15 +98,11 @@ def _draw(axis: Axes, panel: Panel) -> None:
 def scene_cloud(observation: Observation) -> PointCloud:
     """What is seen of the workspace, thinned for a picture."""
     cloud = clouds.crop(clouds.fuse(observation), WORKSPACE_LOWER, WORKSPACE_UPPER)
-    return clouds.voxel_downsample(cloud, 0.006)
+    return clouds.voxel_downsample(cloud, SPACING)
 
 
 def draw_points(
-    axis: Axes,
-    points: FloatArray,
-    colors: NDArray[np.floating],
-    shift: FloatArray | None = None,
-    size: float = 1.6,
+    axis: Axes, points: FloatArray, colors: NDArray[np.floating], shift: FloatArray, size: float = 1.6
 ) -> PathCollection:
     """Draw points (N, 3) of the world in colours (N, 3), or in values (N,) of a colour map; near ones on top.
 
@@ -116,7 +114,7 @@ def draw_points(
         size: area of a point as drawn, square points of typography.
     """
     far_to_near = np.argsort(points @ VIEW[2])
-    positions = project(points)[far_to_near] + (np.zeros(2) if shift is None else shift)
+    positions = project(points)[far_to_near] + shift
     return axis.scatter(positions[:, 0], positions[:, 1], s=size, c=colors[far_to_near], linewidths=0)
 
 

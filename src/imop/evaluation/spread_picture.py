@@ -13,7 +13,7 @@ import tyro
 from PIL import Image
 
 from imop.errors import InvalidInput
-from imop.evaluation.picture import draw_gripper, draw_points, project, scene_cloud
+from imop.evaluation.picture import SPACING, draw_gripper, draw_points, project, scene_cloud
 from imop.evaluation.splits import chosen_tasks
 from imop.evaluation.trials import Trial, demonstration_for
 from imop.extras import extra
@@ -39,8 +39,6 @@ SMALLEST, LARGEST = 1.0, 50.0
 FADED = 0.35
 # Inches of a panel; metres from its middle to its edge, at least, and in parts of what has to be seen.
 SIDE, CLOSEST, ROOM = 3.6, 0.1, 0.8
-# Metres between the points of a scene as drawn.
-SPACING = 0.006
 
 
 @dataclass(frozen=True)
@@ -110,20 +108,17 @@ def save_spreads(panels: list[Panel], path: Path) -> None:
 
 def _draw(axis: Axes, panel: Panel) -> PathCollection:
     """The region in its surroundings and where the gripper goes; returns what the colour bar is for."""
-    region, scene, T_goal = (
-        panel.region,
-        scene_cloud(panel.step.observation),
-        panel.step.action.T_world_gripper,
-    )
+    region, scene = panel.region, scene_cloud(panel.step.observation)
+    T_goal, here = panel.step.action.T_world_gripper, np.zeros(2)
     shown = project(np.concatenate([region.cloud.points, T_goal[None, :3, 3]]))
     middle = (shown.min(axis=0) + shown.max(axis=0)) / 2
     half = max(CLOSEST, ROOM * float(np.ptp(shown, axis=0).max()))
     # As large as the gaps between points: the picture shows surfaces.
     size = (72 * SIDE * SPACING / (2 * half)) ** 2
-    draw_points(axis, scene.points, 1 - FADED * (1 - scene.colors), size=size)
-    drawn = draw_points(axis, region.cloud.points, 1000 * region.spreads, size=size)
+    draw_points(axis, scene.points, 1 - FADED * (1 - scene.colors), here, size)
+    drawn = draw_points(axis, region.cloud.points, 1000 * region.spreads, here, size)
     drawn.set(norm=LogNorm(SMALLEST, LARGEST), cmap="viridis")
-    draw_gripper(axis, T_goal, np.zeros(2))
+    draw_gripper(axis, T_goal, here)
     axis.set(xlim=middle[0] + [-half, half], ylim=middle[1] + [-half, half], aspect="equal")
     axis.set_title(panel.title, fontsize=9)
     axis.set_axis_off()
