@@ -5,24 +5,28 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from imop.extras import extra
 from imop.files import replaced
 from imop.geometry import cloud as clouds
 from imop.geometry import se3
+from imop.geometry.cloud import PointCloud
 from imop.geometry.perception import WORKSPACE_LOWER, WORKSPACE_UPPER
 from imop.types import Action, FloatArray, Keyframe, Observation
 
 with extra("viz"):
     import matplotlib
     from matplotlib.axes import Axes
-    from matplotlib.collections import LineCollection
+    from matplotlib.collections import LineCollection, PathCollection
     from matplotlib.figure import Figure
 
 REGION_COLOR = "#12a150"
 MATCH_COLOR = "#d62728"
 GRIPPER_COLOR = "#1f3fbf"
 MAX_LINES = 60
+# Metres between the points of a scene as drawn.
+SPACING = 0.006
 # Distance (metres) between the two scenes as drawn.
 GAP = 1.3
 
@@ -71,8 +75,9 @@ def save_picture(panels: Sequence[Panel], path: Path) -> None:
 
 def _draw(axis: Axes, panel: Panel) -> None:
     right = np.array([GAP, 0.0])
-    _draw_scene(axis, panel.support.observation, np.zeros(2))
-    _draw_scene(axis, panel.query, right)
+    for observation, shift in ((panel.support.observation, np.zeros(2)), (panel.query, right)):
+        cloud = scene_cloud(observation)
+        draw_points(axis, cloud.points, cloud.colors, shift)
     match = panel.action.match
     if match is not None:
         if len(match.region):
@@ -81,8 +86,8 @@ def _draw(axis: Axes, panel: Panel) -> None:
         chosen = np.linspace(0, len(match.p_support) - 1, min(MAX_LINES, len(match.p_support))).astype(int)
         ends = np.stack([project(match.p_support[chosen]), project(match.p_query[chosen]) + right], axis=1)
         axis.add_collection(LineCollection(list(ends), colors=MATCH_COLOR, linewidths=0.5, alpha=0.7))
-    _draw_gripper(axis, panel.support.action.T_world_gripper, np.zeros(2))
-    _draw_gripper(axis, panel.action.T_world_gripper, right)
+    draw_gripper(axis, panel.support.action.T_world_gripper, np.zeros(2))
+    draw_gripper(axis, panel.action.T_world_gripper, right)
     axis.set_title(
         f"{panel.title}    left: demonstration and region, right: new scene and predicted gripper", fontsize=8
     )
@@ -90,15 +95,31 @@ def _draw(axis: Axes, panel: Panel) -> None:
     axis.set_axis_off()
 
 
-def _draw_scene(axis: Axes, observation: Observation, shift: FloatArray) -> None:
+def scene_cloud(observation: Observation) -> PointCloud:
+    """What is seen of the workspace, thinned for a picture."""
     cloud = clouds.crop(clouds.fuse(observation), WORKSPACE_LOWER, WORKSPACE_UPPER)
-    cloud = clouds.voxel_downsample(cloud, 0.006)
-    far_to_near = np.argsort(cloud.points @ VIEW[2])
-    positions = project(cloud.points)[far_to_near] + shift
-    axis.scatter(positions[:, 0], positions[:, 1], s=1.6, c=cloud.colors[far_to_near], linewidths=0)
+    return clouds.voxel_downsample(cloud, SPACING)
 
 
-def _draw_gripper(axis: Axes, T_world_gripper: FloatArray, shift: FloatArray) -> None:
+def draw_points(
+    axis: Axes, points: FloatArray, colors: NDArray[np.floating], shift: FloatArray, size: float = 1.6
+) -> PathCollection:
+    """Draw points (N, 3) of the world in colours (N, 3), or in values (N,) of a colour map; near ones on top.
+
+    Args:
+        axis: where.
+        points: metres.
+        colors: red, green and blue of 0 .. 1, or any numbers.
+        shift: (2,) metres that the scene is moved by in the picture.
+        size: area of a point as drawn, square points of typography.
+    """
+    far_to_near = np.argsort(points @ VIEW[2])
+    positions = project(points)[far_to_near] + shift
+    return axis.scatter(positions[:, 0], positions[:, 1], s=size, c=colors[far_to_near], linewidths=0)
+
+
+def draw_gripper(axis: Axes, T_world_gripper: FloatArray, shift: FloatArray) -> None:
+    """Draw a gripper at T_world_gripper (4, 4), moved by `shift` (2,) metres in the picture."""
     segments = project(se3.apply(T_world_gripper, GRIPPER.reshape(-1, 3))).reshape(-1, 2, 2) + shift
     axis.add_collection(LineCollection(list(segments), colors="white", linewidths=4.0))
     axis.add_collection(LineCollection(list(segments), colors=GRIPPER_COLOR, linewidths=2.0))

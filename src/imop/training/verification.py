@@ -12,12 +12,17 @@ from pathlib import Path
 import numpy as np
 import torch
 import tyro
+from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional as F
 
 from imop.networks.model import BUNDLED, CARD, load_model, save_model
 from imop.networks.verification import VerificationNetwork
 from imop.training.cases import Cases, read_cases
+from imop.types import FloatArray
+
+BINS = 10
+"""Of equal count, in which probabilities are compared with what came true."""
 
 
 @dataclass(frozen=True)
@@ -123,14 +128,24 @@ def measure(network: VerificationNetwork, cases: _Grouped) -> dict[str, float]:
     best = [a + int(np.argmax(p[a:b])) for a, b in cases.ranges]
     hit, sure = cases.right.numpy()[best].astype(float), p[best]
     possible = [bool(cases.right[a:b].any()) for a, b in cases.ranges]
-    bins = np.array_split(np.argsort(sure), 10)
-    error = sum(abs(hit[b].mean() - sure[b].mean()) * len(b) for b in bins if len(b)) / len(hit)
     return {
         "right": float(hit.mean()),
         "possible": float(np.mean(possible)),
         "sure": float(sure.mean()),
-        "calibration": float(error),
+        "calibration": calibration_error(sure, hit),
     }
+
+
+def equal_bins(sure: FloatArray) -> list[NDArray[np.intp]]:
+    """Indices of probabilities (N,), the smallest first, in up to ten bins of equal count."""
+    bins = np.array_split(np.argsort(sure, kind="stable"), BINS)
+    return [b for b in bins if len(b)]
+
+
+def calibration_error(sure: FloatArray, hit: FloatArray) -> float:
+    """Expected calibration error of probabilities (N,) over ten bins of equal count; `hit` (N,) is 0 or 1."""
+    gaps = (abs(hit[b].mean() - sure[b].mean()) * len(b) for b in equal_bins(sure))
+    return float(sum(gaps) / len(hit))
 
 
 def main() -> None:
