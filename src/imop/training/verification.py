@@ -46,11 +46,11 @@ class VerificationTraining:
     out: Path
     weights: Path = BUNDLED
     held: float = 0.15
-    steps: int = 4000
+    steps: int = 2000
     batch: int = 64
     learning_rate: float = 2e-3
     weight_decay: float = 0.05
-    dropout: float = 0.05
+    dropout: float = 0.2
     seed: int = 0
 
 
