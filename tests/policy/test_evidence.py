@@ -48,7 +48,7 @@ def test_a_glance_prefers_the_true_motion_in_every_column():
     cloud, T = box(SIZE, RED), at(0.2, 0.1, yaw=1.0)
     template = Template(region(cloud), GOAL, cloud, (), PolicyConfig())
     looks = glance(template, Surface(moved(cloud, T), ()), np.stack([T, at(0.03, 0.0, 0.0) @ T]))
-    assert looks.shape == (2, 4) and (looks[0] > looks[1]).all() and (looks[0] > 0.8).all()
+    assert looks.shape == (2, 5) and (looks[0] > looks[1]).all() and (looks[0] > 0.8).all()
 
 
 def test_what_may_differ_is_explained_loosely():

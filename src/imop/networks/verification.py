@@ -11,8 +11,8 @@ from torch import Tensor, nn
 
 from imop.networks.blocks import Standardized
 
-WEIGHTINGS = ("region", "near", "firm")
-"""All points of the region, those next to the gripper, and those that stay in place."""
+WEIGHTINGS = ("region", "near", "firm", "taken")
+"""All points of the region, those next to the gripper, those that stay in place, and what the hand takes."""
 
 EVIDENCE = (
     *(
@@ -29,7 +29,16 @@ EVIDENCE = (
     *("held", "opens", "opening", "size", "points", "certainty", "spread", "near_spread", "turns", "marks"),
 )
 """What is known of a candidate on its own."""
-RIVALRY = ("region_exact", "near_loose", "firm_loose", "matches_loose", "pattern", "alike", "clear")
+RIVALRY = (
+    "region_exact",
+    "near_loose",
+    "firm_loose",
+    "taken_loose",
+    "matches_loose",
+    "pattern",
+    "alike",
+    "clear",
+)
 """What is compared with the best candidate of all, and with the best that acts somewhere else: numbers of the
 evidence, what is explained in its colour (`alike`), and what is not contradicted by colours (`clear`)."""
 INPUTS = len(EVIDENCE) + 2 * len(RIVALRY)

@@ -14,6 +14,8 @@ from scipy.spatial import cKDTree
 
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, concatenate, farthest_points, project
+from imop.geometry.neighbours import within
+from imop.policy.contacts import SAME
 from imop.policy.interfaces import PolicyConfig
 from imop.policy.region import Region
 from imop.types import BoolArray, CameraView, Float32Array, FloatArray
@@ -131,13 +133,14 @@ class Template:
         beside: what stands around there in the demonstrated scene, with normals; at least one point.
         views: of the demonstrated scene.
         config: says how many points are compared.
+        payload: what the hand takes next, if that is less than the region.
 
     Attributes:
         cloud: points of the region, `size` of them, then of its context.
         glance: those that are compared at a glance.
         backward: how many observed points are compared with the region.
         hue, spread: (M, 4) shades and (M,) spread of them.
-        weights: (M, 4), see `_weights`.
+        weights: (M, 5), see `_weights`.
         marks: variance of the region's shades.
     """
 
@@ -148,6 +151,7 @@ class Template:
         beside: PointCloud,
         views: Sequence[CameraView],
         config: PolicyConfig,
+        payload: PointCloud | None = None,
     ) -> None:
         own, others, self.backward = config.compared
         chosen, few = farthest_points(region.cloud.points, own), np.zeros(0, dtype=np.int64)
@@ -158,7 +162,7 @@ class Template:
         self.cloud = concatenate(parts)
         self.hue = shades(self.cloud.colors)
         self.spread = np.concatenate([region.spreads[chosen], np.full(len(few), OFFSET)])
-        self.weights = self._weights(region, chosen, len(few), p_goal)
+        self.weights = self._weights(region, chosen, len(few), p_goal, payload)
         self.size, self.marks = len(chosen), float(self.hue[: len(chosen)].var(axis=0).sum())
         glance = np.arange(len(self.cloud))
         own, others = config.glanced
@@ -167,14 +171,27 @@ class Template:
         self.region, self.p_goal = region, p_goal
 
     @staticmethod
-    def _weights(region: Region, chosen: NDArray[np.int64], context: int, p_goal: FloatArray) -> FloatArray:
-        """(M, 4) of the region, near the gripper, of what stays in place, and of the context."""
+    def _weights(
+        region: Region,
+        chosen: NDArray[np.int64],
+        context: int,
+        p_goal: FloatArray,
+        payload: PointCloud | None,
+    ) -> FloatArray:
+        """(M, 5) of the region, near the gripper, of what stays in place, of what is taken, of the context.
+
+        If all of the region is taken, or none, what is near the gripper stands for it.
+        """
         weight = region.weight[chosen]
         away = np.linalg.norm(region.cloud.points[chosen] - p_goal, axis=1)
         near = weight * np.exp(-0.5 * ((away - away.min()) / NEXT) ** 2)
         firm = weight * region.trust[chosen]
-        own = np.stack([weight, near, firm, np.zeros(len(chosen))], axis=1)
-        others = np.tile([0.0, 0.0, 0.0, 1.0], (context, 1))
+        taken = np.zeros(len(chosen))
+        if payload is not None:
+            taken = weight * within(region.cloud.points[chosen], payload.points, SAME)
+        taken = taken if taken.any() else near
+        own = np.stack([weight, near, firm, taken, np.zeros(len(chosen))], axis=1)
+        others = np.tile([0.0, 0.0, 0.0, 0.0, 1.0], (context, 1))
         return np.concatenate([own, others])
 
     def moved(self, T: FloatArray, which: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
@@ -185,20 +202,20 @@ class Template:
 
 
 def glance(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
-    """(H, 4) quick looks at motions (H, 4, 4): the region in its colours, its shape, the near, the firm."""
+    """(H, 5) quick looks at motions (H, 4, 4): the region in its colours, its shape, near, firm, what is taken."""
     which = template.glance
     found = surface.explain(*template.moved(T, which), *_tiled(template, which, len(T)))
     loose, color = found.loose.reshape(len(T), -1), found.color.reshape(len(T), -1)
     w = template.weights[which]
-    values = (loose * color, loose, loose * np.sqrt(color), loose)
-    columns = (w[:, 0], w[:, 0], w[:, 1], w[:, 2])
+    values = (loose * color, loose, loose * np.sqrt(color), loose, loose * np.sqrt(color))
+    columns = (w[:, 0], *w[:, :4].T)
     return np.stack(
         [(v * c).sum(1) / max(c.sum(), 1e-9) for v, c in zip(values, columns, strict=True)], axis=1
     )
 
 
 def shares(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
-    """(H, 28) what `networks.verification.EVIDENCE` names first: forward, context, backward, around."""
+    """(H, 34) what `networks.verification.EVIDENCE` names first: forward, context, backward, around."""
     H, which = len(T), np.arange(len(template.cloud))
     points, normals = template.moved(T, which)
     found = surface.explain(points, normals, *_tiled(template, which, H))
@@ -206,10 +223,10 @@ def shares(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
     hidden, absent = _missing(surface, points, normals, found.loose)
     hidden, absent = hidden.reshape(H, -1), absent.reshape(H, -1)
     columns = []
-    for w in template.weights[:, :3].T:
+    for w in template.weights[:, :4].T:
         visible = np.maximum((1 - hidden * (1 - loose)) @ w, 1e-9)
         columns += [exact @ w / visible, loose @ w / visible, *_rest(loose, color, hidden, absent, w)]
-    w = template.weights[:, 3]
+    w = template.weights[:, 4]
     all_of_it = max(w.sum(), 1e-9)
     columns += [loose @ w / all_of_it, (loose * color) @ w / np.maximum(loose @ w, 1e-9)]
     columns += [(absent * (1 - loose)) @ w / all_of_it]

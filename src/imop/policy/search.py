@@ -41,7 +41,7 @@ class StepSearch:
         before, T_goal = step.before, step.action.T_world_gripper
         views = tuple(before.observation.views.values())
         standing = before.cloud.select(~before.ground.bare)
-        template = Template(region, T_goal[:3, 3], _beside(standing, T_goal, region), views, config)
+        template = Template(region, T_goal[:3, 3], _beside(standing, T_goal, region), views, config, payload)
         parts = _parts(region, payload, T_goal[:3, 3], config)
         turns = equal_turns(region.cloud)
         self.sought, self._ask = Sought(config, step, region, template, parts, turns, verifier), ask
@@ -166,7 +166,7 @@ def _parts(
     if SMALLEST <= len(near) < 0.8 * len(points):
         parts.append(_part("part", 2, near))
     if payload is not None:
-        parts.append(_part("payload", 2, payload.points))
+        parts.append(_part("payload", 4, payload.points))
     return tuple(parts)
 
 
