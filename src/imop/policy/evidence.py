@@ -202,7 +202,10 @@ class Template:
 
 
 def glance(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
-    """(H, 5) quick looks at motions (H, 4, 4): the region in its colours, its shape, near, firm, what is taken."""
+    """(H, 5) quick looks at motions (H, 4, 4).
+
+    At the region in its colours, its shape, what is near, what is firm, and what is taken.
+    """
     which = template.glance
     found = surface.explain(*template.moved(T, which), *_tiled(template, which, len(T)))
     loose, color = found.loose.reshape(len(T), -1), found.color.reshape(len(T), -1)
