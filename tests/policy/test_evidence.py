@@ -6,7 +6,7 @@ import pytest
 from imop.geometry import se3
 from imop.geometry.cloud import concatenate
 from imop.networks.verification import EVIDENCE
-from imop.policy.evidence import OFFSET, Surface, Template, glance, pattern, shades, shares
+from imop.policy.evidence import OFFSET, Surface, Template, glance, palette, pattern, shades, shares
 from imop.policy.interfaces import PolicyConfig
 from imop.policy.region import Region
 from tests.policy.scenes import BLUE, GREEN, RED, at, box, camera, moved
@@ -193,3 +193,12 @@ def test_a_pattern_is_any_linear_map_of_colours_but_not_chance(rng):
     found = np.stack([shown @ rng.random((4, 4)) + 0.3, rng.random((300, 4))])
     mapped, chance = pattern(shown, found, weight)
     assert mapped > 0.9 and chance < 0.1
+
+
+def test_colours_are_in_the_palette_of_a_scene_wherever_they_are():
+    template = Template(region(marked(RED, GREEN)), GOAL, box(SIZE, RED), (), PolicyConfig())
+    red, both = box(SIZE, RED, at(0.5, 0.5)), concatenate([box(SIZE, RED, at(0.5, 0.5)), box(SIZE, GREEN)])
+    everywhere, half, nothing = (
+        palette(template, Surface(cloud, ())) for cloud in (both, red, box(SIZE, BLUE))
+    )
+    assert everywhere > 0.99 > 0.9 > half > 0.5 > 0.1 > nothing

@@ -27,6 +27,7 @@ EVIDENCE = (
     *(f"matches_{name}" for name in ("asked", "sure", "tight", "loose", "near")),
     *("tilt", "rise", "begun", "hint_away", "hint_turn", "gripper_away", "gripper_turn"),
     *("held", "opens", "opening", "size", "points", "certainty", "spread", "near_spread", "turns", "marks"),
+    "palette",
 )
 """What is known of a candidate on its own."""
 RIVALRY = (

@@ -241,6 +241,15 @@ def shares(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
     return np.concatenate([rows, backward], axis=1)
 
 
+def palette(template: Template, surface: Surface) -> float:
+    """Share 0 .. 1 of the region's colours that are somewhere in the scene, wherever that is.
+
+    Where they are, something in other colours is rather not meant; where they are not, it may be.
+    """
+    away, _ = cKDTree(surface.shades[surface.sample]).query(template.hue[: template.size])
+    return float(np.average(np.exp(-0.5 * (away / SHADE) ** 2), weights=template.weights[: template.size, 0]))
+
+
 def pattern(shown: FloatArray, found: FloatArray, weight: FloatArray) -> FloatArray:
     """(H,) share of the variance of the colours found that a linear map of the colours shown explains.
 

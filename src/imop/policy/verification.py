@@ -16,7 +16,7 @@ from imop.geometry.icp import CLOSE, FINEST
 from imop.geometry.ransac import distinct
 from imop.networks.verification import EVIDENCE, RIVALRY, VerificationNetwork
 from imop.policy.contacts import SAME
-from imop.policy.evidence import Template, glance, shares
+from imop.policy.evidence import Template, glance, palette, shares
 from imop.policy.interfaces import Candidate, PolicyConfig, Transition
 from imop.policy.proposals import Asked, Matches
 from imop.policy.region import Region
@@ -130,6 +130,7 @@ class Pool:
     ) -> None:
         self._sought, self.target, self.T_last = sought, target, T_last
         self.T_repeated, self.asked = T_repeated, asked
+        self._palette = palette(sought.template, target.surface)
         self.motions: list[FloatArray] = []
         self.generators: list[str] = []
         self._rows: list[FloatArray] = []
@@ -260,7 +261,7 @@ class Pool:
         return np.stack(columns, axis=1)
 
     def _situation(self, count: int) -> FloatArray:
-        """(count, 10) what is the same for all candidates: the hand, and what kind of region it is."""
+        """(count, 11) what is the same for all candidates: the hand, and what kind of region it is."""
         sought, step = self._sought, self._sought.step
         region, spread, w = sought.region, sought.template.spread, sought.template.weights
         size = np.ptp(region.cloud.points, axis=0).max()
@@ -275,5 +276,6 @@ class Pool:
             *(100 * np.average(spread, weights=w[:, k] + 1e-9) for k in (0, 1)),
             np.log(len(sought.turns)),
             sought.template.marks,
+            self._palette,
         ]
         return np.tile(np.array(values, dtype=np.float64), (count, 1))
