@@ -31,7 +31,7 @@ def test_what_decides_is_learned(tmp_path):
     network = VerificationNetwork(VerificationConfig(width=16))
     reached = fit(network, some(np.random.default_rng(0), 300), VerificationTraining((), tmp_path, steps=400))
     assert reached["right"] > 0.65 * reached["possible"] > 0.6
-    assert reached["calibration"] < 0.25
+    assert reached["calibration"] < 0.35 and abs(reached["sure"] - reached["right"]) < 0.25
 
 
 def test_the_loss_by_hand():
