@@ -23,22 +23,22 @@ class Step:
             several poses that look the same the nearest counts.
         rotation_error: radians, likewise.
         confidence: the policy's.
-        generator: who proposed the motion, see `policy/proposals.py`; empty if nobody competed.
-        reachable: whether the arm can go there; None if that was not asked.
         policy_seconds: time to decide.
         motion_seconds: time to plan and simulate.
         plan_failed: reason, if no motion was found.
+        generator: who proposed the motion, see `policy/proposals.py`; empty if nobody competed.
+        reachable: whether the arm can go there; None if that was not asked.
     """
 
     support_step: int | None
     position_error: float | None
     rotation_error: float | None
     confidence: float
-    generator: str
-    reachable: bool | None
     policy_seconds: float
     motion_seconds: float
     plan_failed: str | None = None
+    generator: str = ""
+    reachable: bool | None = None
 
 
 @dataclass(frozen=True)
@@ -98,11 +98,11 @@ def rollout(
                 position,
                 rotation,
                 action.confidence,
-                action.match.generator if action.match else "",
-                action.reachable,
                 decided - started,
                 time.perf_counter() - decided,
                 info.get("plan_failed"),
+                action.match.generator if action.match else "",
+                action.reachable,
             )
         )
         if info.get("success"):
