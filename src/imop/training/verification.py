@@ -33,6 +33,7 @@ class VerificationTraining:
         cases: folders of cases.
         out: folder of the weights, with all other networks as they were.
         weights: folder of the other networks.
+        further: whether the verification network of that folder is trained on, instead of a fresh one.
         held: share of the cases that are kept for the report.
         steps: of AdamW.
         batch: candidates' cases per step.
@@ -45,6 +46,7 @@ class VerificationTraining:
     cases: tuple[Path, ...]
     out: Path
     weights: Path = BUNDLED
+    further: bool = False
     held: float = 0.15
     steps: int = 2000
     batch: int = 64
@@ -152,7 +154,8 @@ def main() -> None:
     """Command line."""
     config = tyro.cli(VerificationTraining, description=__doc__)
     model = load_model(config.weights)
-    model.verification = VerificationNetwork(model.config.verification)
+    if not config.further:
+        model.verification = VerificationNetwork(model.config.verification)
     reached = fit(model.verification, read_cases(*config.cases), config)
     print(", ".join(f"{name} {value:.3f}" for name, value in reached.items()))
     card = json.loads((config.weights / CARD).read_text())
