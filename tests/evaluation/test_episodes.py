@@ -56,8 +56,9 @@ def test_a_damaged_line_is_named(tmp_path, line):
 def test_weights_count_only_for_methods_that_have_some(tmp_path):
     (tmp_path / "weights.safetensors").write_bytes(b"others")
     assert method_state("learned", None, POT) != method_state("learned", tmp_path, POT)
-    assert method_state("registration", None, POT) == method_state("registration", tmp_path, POT)
-    assert method_state("expert", None, POT) != method_state("registration", None, POT)
+    assert method_state("registration", None, POT) != method_state("registration", tmp_path, POT)
+    assert method_state("textbook", None, POT) == method_state("textbook", tmp_path, POT)
+    assert method_state("expert", None, POT) != method_state("textbook", None, POT)
 
 
 def test_the_states_of_our_own_tasks_need_no_further_digest():

@@ -82,8 +82,8 @@ def test_same_and_other_things_are_told_apart_and_compared_step_by_step():
 def test_trials_of_a_demonstration_show_the_same_and_other_things():
     found = groups(Options(tasks="open_drawer,close_jar", scenes=4))
     for trials in found:
-        assert len({(t.task, t.variation, t.shown_instance) for t in trials}) == 1
-        same = [t for t in trials if t.instance == t.shown_instance]
+        assert len({(t.task, t.variation, t.demonstrated.instance) for t in trials}) == 1
+        same = [t for t in trials if t.instance == t.demonstrated.instance]
         assert len(same) == len(trials) / 2
     assert sum(map(len, found)) == 2 * 2 * 4
 

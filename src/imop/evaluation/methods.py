@@ -66,9 +66,10 @@ def make_policy(
     is_robot, reachable = robot_functions(robot)
     perception = Perception(is_robot)
     if method in ("registration", "textbook"):
-        matcher: Matcher = TextbookMatcher()
-        if method == "registration":
-            matcher = RegistrationMatcher.from_pretrained(weights or BUNDLED)
+        registered = method == "registration"
+        matcher: Matcher = (
+            RegistrationMatcher.from_pretrained(weights or BUNDLED) if registered else TextbookMatcher()
+        )
         return OneShotPolicy(matcher, perception, min_confidence=min_confidence, feasible=reachable)
     if method in ("learned", "routed"):
         return OneShotPolicy.from_pretrained(

@@ -94,7 +94,10 @@ class StepSearch:
             return
         pool = Pool(self.sought, Target(query, standing), T_last, T_repeated, self._ask(query))
         self._followed(pool)
-        for generate in (self._fitted, self._searched, self._anywhere):
+        stages = [self._searched, self._anywhere]
+        if pool.asked and pool.asked.fits:
+            stages.insert(0, self._fitted)
+        for generate in stages:
             generate(pool)
             yield pool
 
