@@ -6,9 +6,10 @@ import pytest
 from imop.geometry import se3
 from imop.geometry.cloud import concatenate
 from imop.networks.verification import EVIDENCE
-from imop.policy.evidence import OFFSET, Surface, Template, glance, palette, pattern, shades, shares
+from imop.policy.evidence import Template, glance, palette, pattern, shares
 from imop.policy.interfaces import PolicyConfig
 from imop.policy.region import Region
+from imop.policy.target import OFFSET, Surface, shades
 from tests.policy.scenes import BLUE, GREEN, RED, at, box, camera, moved
 
 SIZE = (0.08, 0.05, 0.06)

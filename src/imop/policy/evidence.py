@@ -6,122 +6,27 @@ decided here: `networks/verification.py` learns what the numbers are worth.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud, concatenate, farthest_points, project
+from imop.geometry.cloud import PointCloud, concatenate, farthest_points
 from imop.geometry.neighbours import within
 from imop.policy.contacts import SAME
 from imop.policy.interfaces import PolicyConfig
 from imop.policy.region import Region
-from imop.types import BoolArray, CameraView, Float32Array, FloatArray
+from imop.policy.target import BESIDE, OFFSET, SHADE, Explained, Surface, shades
+from imop.types import CameraView, FloatArray
 
-# Farthest counterpart, metres.
-REACH = 0.03
-# Standard deviations of what is explained exactly: off the counterpart's tangent plane and along it, metres.
-OFFSET, ALONG = 0.005, 0.008
-# Standard deviation of the difference of two shades of one colour; see `shades`.
-SHADE = 0.25
-# What a counterpart counts that faces the other way: thin walls are seen from either side.
-BEHIND = 0.9
-# A camera sees a face from this cosine of the angle to its normal on, and must see this far (metres) behind
-# a point to prove it absent.
-GRAZING, THROUGH = 0.25, 0.02
 # Observed points this near to the moved region, metres, have to be explained by it.
 AROUND = 0.04
-# What is farther than this (metres) from where the gripper goes has nothing to say about it.
-BESIDE = 0.08
 # Colours that agree less than this contradict each other. What their pattern explains is told from noise of
 # this variance.
 CLASH, NOISE = 0.1, 0.02
 # What is next to the gripper: scale of the weights, metres.
 NEXT = 0.05
-
-
-@dataclass(frozen=True, eq=False)
-class Explained:
-    """How well a surface explains K points.
-
-    Attributes:
-        exact: (K,) 0 .. 1, as if the thing were the same.
-        loose: (K,) 0 .. 1, with the spread that each point is allowed.
-        color: (K,) 0 .. 1, agreement of the colours; 0 where there is no counterpart.
-        index: (K,) the counterparts.
-    """
-
-    exact: FloatArray
-    loose: FloatArray
-    color: FloatArray
-    index: NDArray[np.int64]
-
-
-class Surface:
-    """What was observed of a scene or of a part of it.
-
-    Args:
-        cloud: at least one point, with normals.
-        views: that it was seen in.
-
-    Attributes:
-        cloud: the same.
-        tree: of its points.
-        shades: (N, 4) of its colours.
-        sample: indices of about a thousand of its points.
-    """
-
-    def __init__(self, cloud: PointCloud, views: Sequence[CameraView]) -> None:
-        self.cloud, self._views = cloud, views
-        self.tree = cKDTree(cloud.points)
-        self.shades = shades(cloud.colors)
-        # The grid has spread the points evenly already.
-        self.sample = np.arange(0, len(cloud), max(1, len(cloud) // 1000))
-
-    def explain(
-        self, points: FloatArray, normals: FloatArray, hue: FloatArray, spread: FloatArray
-    ) -> Explained:
-        """How well this explains points (K, 3) with normals (K, 3), shades (K, 4) and a spread (K,)."""
-        assert self.cloud.normals is not None
-        distance, index = self.tree.query(points, distance_upper_bound=REACH)
-        found = np.isfinite(distance)
-        index = np.where(found, index, 0).astype(np.int64)
-        n = self.cloud.normals[index]
-        offset = np.einsum("mk,mk->m", n, points - self.cloud.points[index]) ** 2
-        along = np.maximum(np.where(found, distance, 0.0) ** 2 - offset, 0.0)
-        facing = np.einsum("mk,mk->m", n, normals)
-        facing = np.where(found, np.clip(np.where(facing < 0, -BEHIND * facing, facing), 0.0, 1.0), 0.0)
-        exact = facing * np.exp(-0.5 * (offset / OFFSET**2 + along / ALONG**2))
-        more = spread**2
-        loose = facing * np.exp(-0.5 * (offset / (OFFSET**2 + more) + along / (ALONG**2 + more)))
-        color = np.exp(-0.5 * (((hue - self.shades[index]) / SHADE) ** 2).sum(axis=1))
-        return Explained(exact, loose, np.where(found, color, 0.0), index)
-
-    def seen(self, points: FloatArray, normals: FloatArray) -> tuple[BoolArray, BoolArray]:
-        """(K,) True where no view can say that a face at the point, with its normal, is not there.
-
-        A view can if the face lies in its image and turns to it, and nothing nearer stands before it. And
-        (K,) True where a view sees through the point to what is farther away.
-        """
-        hidden, through = np.ones(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
-        for view in self._views:
-            to_camera = view.T_world_camera[:3, 3] - points
-            distance = np.maximum(np.linalg.norm(to_camera, axis=1), 1e-9)
-            slant = np.einsum("mk,mk->m", to_camera, normals) / distance
-            (column, row), z, inside = (part.T for part in project(view, points))
-            depth = view.depth[row, column]
-            beyond = np.where(inside & np.isfinite(depth), depth - z, -np.inf)
-            hidden &= ~((beyond > -THROUGH) & (slant > GRAZING))
-            through |= beyond > THROUGH
-        return hidden, through
-
-
-def shades(colors: Float32Array) -> FloatArray:
-    """Colours (N, 3) of 0 .. 1 as (N, 4) hue and a little brightness, for light changes with a turn."""
-    bright = colors.mean(axis=1, keepdims=True).astype(np.float64)
-    return np.concatenate([(colors - bright) / (bright + 0.05), 0.35 * bright], axis=1)
 
 
 class Template:

@@ -8,11 +8,11 @@ import numpy as np
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, farthest_points
 from imop.geometry.icp import SMALLEST, upright
-from imop.policy.evidence import BESIDE, Template
+from imop.policy.evidence import Template
 from imop.policy.interfaces import BEGINNING, Candidate, Feasible, PolicyConfig, Progress, Scene, Transition
 from imop.policy.proposals import Asked, equal_turns, half_turn, straightened, upright_motions
 from imop.policy.region import Region
-from imop.policy.target import Target, around, middle, thing_of, without_held
+from imop.policy.target import BESIDE, Target, around, middle, thing_of, without_held
 from imop.policy.verification import Part, Pool, Sought, Verifier
 from imop.types import FloatArray
 
