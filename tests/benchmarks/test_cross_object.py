@@ -60,7 +60,7 @@ def never(*_):
 def test_a_run_that_was_stopped_goes_on_and_other_code_begins_anew(tmp_path, monkeypatch):
     done = []
 
-    def attempt(trial, demonstration, method, state, weights):
+    def attempt(trial, demonstration, method, state, weights, focus):
         if len(done) == 3:
             raise KeyboardInterrupt
         done.append((trial, state))
