@@ -84,6 +84,9 @@ os.rename("begun", "pid")
 time.sleep(600)
 """
 STAGES = """
+import signal
+# A shell has what it runs in the background ignore interrupts, and so would this.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 import sys
 from pathlib import Path
 from rich.console import Console
