@@ -15,12 +15,11 @@ from imop.geometry import se3
 from imop.geometry.icp import CLOSE, FINEST
 from imop.geometry.ransac import distinct
 from imop.networks.verification import EVIDENCE, RIVALRY, VerificationNetwork
-from imop.policy.contacts import SAME
 from imop.policy.evidence import Template, glance, palette, shares
 from imop.policy.interfaces import Candidate, PolicyConfig, Transition
 from imop.policy.proposals import Asked, Matches
 from imop.policy.region import Region
-from imop.policy.target import Target
+from imop.policy.target import REACH, Target
 from imop.types import BoolArray, FloatArray
 
 # Candidates that take the gripper farther apart than this, metres and radians, are rivals.
@@ -181,7 +180,8 @@ class Pool:
         """Those of motions (H, 4, 4) that act on what is meant."""
         template = self._sought.template
         near, which = template.weights[: template.size, 1], np.arange(template.size)
-        inside = self.target.query.focused(template.moved(T, which)[0], SAME)
+        # Another thing may be smaller than the one that was shown.
+        inside = self.target.query.focused(template.moved(T, which)[0], REACH)
         share = inside.reshape(len(T), -1) @ near / near.sum()
         return np.asarray(T[share >= self._sought.config.focused])
 
