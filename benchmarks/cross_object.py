@@ -21,7 +21,7 @@ from rich.table import Table
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.benchmark import count_of, tried
 from imop.evaluation.episodes import Episode
-from imop.evaluation.report import save_json
+from imop.evaluation.report import markdown_table, save_json
 from imop.evaluation.statistics import wilson
 from imop.evaluation.trials import Trial
 from imop.files import replaced, writable_folder
@@ -161,9 +161,7 @@ def markdown(cells: Cells, method: str) -> str:
         "",
         "Successes; an error is something that the method could not handle, and counts as a failure.",
         "",
-        "| " + " | ".join(header) + " |",
-        "|" + "---|" * len(header),
-        *("| " + " | ".join(row) + " |" for row in body),
+        *markdown_table(header, body),
         "",
         *(f"- {sentence}" for sentence in averages(cells)),
         "",

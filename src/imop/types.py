@@ -312,6 +312,12 @@ class Demonstration:
         last = len(self.keyframes) - 1
         return self.final if step == last else self.keyframes[step + 1].observation
 
+    @property
+    def closing(self) -> int:
+        """The first step that closes the gripper; as many as there are if none does."""
+        steps = (k for k, step in enumerate(self.keyframes) if not step.action.gripper_open)
+        return next(steps, len(self))
+
     def stripped(self) -> "Demonstration":
         """The same demonstration without anything that only training or a simulator knows."""
         keyframes = tuple(Keyframe(k.observation.stripped(), k.action) for k in self.keyframes)

@@ -17,11 +17,10 @@ def pointing(demonstration: Demonstration) -> Pointing:
     Args:
         demonstration: with names of the objects that the steps are fixed to.
     """
-    keyframes = demonstration.keyframes
-    closing = next((k for k, step in enumerate(keyframes) if not step.action.gripper_open), len(keyframes))
+    name, closing = demonstration.keyframes[0].object_name, demonstration.closing
 
     def point(number: int, seen: Observation) -> Focus | None:
-        return None if number > closing else focus_on(keyframes[0].object_name, seen)
+        return None if number > closing else focus_on(name, seen)
 
     return point
 

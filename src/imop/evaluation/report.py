@@ -1,7 +1,7 @@
 """Success counts to results.json, report.md and a table on the terminal."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -97,9 +97,7 @@ class Results:
             "",
             "Success rates with 95 % Wilson intervals; every method saw the same demonstrations and scenes.",
             "",
-            "| " + " | ".join(header) + " |",
-            "|" + "---|" * len(header),
-            *("| " + " | ".join(row) + " |" for row in body),
+            *markdown_table(header, body),
             "",
             *(f"- {note}" for note in self.notes),
         ]
@@ -126,3 +124,9 @@ def save_json(value: Any, path: Path) -> None:
     """Write `value` as indented JSON, whole or not at all."""
     with replaced(path) as temporary:
         temporary.write_text(json.dumps(value, indent=2) + "\n")
+
+
+def markdown_table(header: Sequence[str], body: Iterable[Sequence[str]]) -> list[str]:
+    """The lines of a table."""
+    rule = "|" + "---|" * len(header)
+    return [f"| {' | '.join(header)} |", rule, *(f"| {' | '.join(row)} |" for row in body)]

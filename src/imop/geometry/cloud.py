@@ -49,10 +49,6 @@ class PointCloud:
             None if self.ids is None else self.ids[rows],
         )
 
-    def colorless(self) -> "PointCloud":
-        """The same points, all black."""
-        return replace(self, colors=np.zeros_like(self.colors))
-
 
 def unproject(view: CameraView) -> FloatArray:
     """(H, W, 3) world-frame points of every pixel; meaningless where depth is no measurement."""

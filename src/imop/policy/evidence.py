@@ -73,7 +73,7 @@ class Template:
         own, others = config.glanced
         self.glance = glance[(glance < own) | (glance >= self.size) & (glance < self.size + others)]
         self.whole, self.beside = Surface(region.whole, views), Surface(beside, views)
-        self.region, self.p_goal = region, p_goal
+        self.p_goal = p_goal
 
     @staticmethod
     def _weights(
@@ -207,13 +207,14 @@ def _backward(template: Template, surface: Surface, T: FloatArray) -> FloatArray
     whole, back = template.whole, se3.invert(T)
     points = se3.apply(back, surface.cloud.points[surface.sample])
     near = np.flatnonzero(np.isfinite(whole.tree.query(points, distance_upper_bound=AROUND)[0]))
-    found = _explain(whole, surface.cloud.select(surface.sample[_some(near, template.backward)]), back)
+    found = _explain(whole, surface, surface.sample[_some(near, template.backward)], back)
     got, all_of_it = max(float(found.loose.sum()), 1e-9), max(len(found.loose), 1)
     color, clash = found.loose @ found.color / got, found.loose @ (found.color < CLASH) / got
-    forward = _explain(surface, template.beside.cloud, T).loose
+    beside = template.beside
+    forward = _explain(surface, beside, np.arange(len(beside.cloud)), T).loose
     at = se3.apply(T, template.p_goal[None])[0]
     inside = np.asarray(surface.tree.query_ball_point(at, BESIDE, return_sorted=True), dtype=np.int64)
-    there = _explain(template.beside, surface.cloud.select(_some(inside, template.backward)), back).loose
+    there = _explain(beside, surface, _some(inside, template.backward), back).loose
     return np.array([got / all_of_it, color, clash, np.log1p(len(near)) / 5, forward.mean(), _mean(there)])
 
 
@@ -227,10 +228,8 @@ def _mean(values: FloatArray) -> float:
     return float(values.mean()) if len(values) else 1.0
 
 
-def _explain(surface: Surface, cloud: PointCloud, T: FloatArray) -> Explained:
-    """How well a surface explains a cloud with normals, moved by `T`, but for what cameras leave open."""
-    assert cloud.normals is not None
-    spread = np.full(len(cloud), OFFSET)
-    return surface.explain(
-        se3.apply(T, cloud.points), se3.rotate(T, cloud.normals), shades(cloud.colors), spread
-    )
+def _explain(surface: Surface, other: Surface, which: NDArray[np.int64], T: FloatArray) -> Explained:
+    """How well a surface explains some points of another one, moved by `T`, as if cameras saw all."""
+    assert other.cloud.normals is not None
+    points, normals = se3.apply(T, other.cloud.points[which]), se3.rotate(T, other.cloud.normals[which])
+    return surface.explain(points, normals, other.shades[which], np.full(len(which), OFFSET))

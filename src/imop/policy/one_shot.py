@@ -203,11 +203,11 @@ class OneShotPolicy:
 
 def _focused(scenes: Sequence[Scene], demonstration: Demonstration, focus: Focus) -> list[Scene]:
     """The scenes, of which those until the gripper closes are focused on what is meant in the first."""
-    keyframes = demonstration.keyframes
-    closing = next((k for k, kf in enumerate(keyframes) if not kf.action.gripper_open), len(keyframes) - 1)
     first = scenes[0]
     meant = Focus(points=first.fused.points[in_focus(focus, first.observation, first.fused)])
     return [
-        replace(scene, focus=in_focus(meant, scene.observation, scene.fused)) if k <= closing else scene
+        replace(scene, focus=in_focus(meant, scene.observation, scene.fused))
+        if k <= demonstration.closing
+        else scene
         for k, scene in enumerate(scenes)
     ]
