@@ -9,9 +9,11 @@ import torch
 from imop.geometry import se3
 from imop.networks.model import BUNDLED, load_model
 from imop.networks.verification import INPUTS, VerificationConfig, VerificationNetwork
+from imop.policy.learned import LearnedMatcher
 from imop.training import cases
 from imop.training.cases import Cases, make_cases, read_cases, right_goals, write_cases
 from imop.training.families import TRAINING
+from imop.training.synthetic import synthetic_scenes
 from imop.training.verification import VerificationTraining, fit, loss
 
 
@@ -76,6 +78,19 @@ def test_cases_are_made_again_written_and_read(tmp_path):
     assert found.inputs.shape == (2 * sum(len(right) for _, right in stages), INPUTS)
     assert found.case.max() + 1 == 2 * len(stages) and (np.diff(found.case) >= 0).all()
     assert found.right.mean() > 0 and np.isfinite(found.inputs).all()
+
+
+def test_nothing_is_right_where_its_things_are_not():
+    families = {name: TRAINING[name] for name in ("block", "tray")}
+    scenes = synthetic_scenes(families, "same", 5)
+    group = cases._executions(next(scenes))[0]
+    other = next(scenes)[0].asked.observations[0]
+    matcher = LearnedMatcher(load_model(BUNDLED))
+    absent, *present = cases._cases(
+        group, matcher, cases._SetUp({}, {}), np.random.default_rng(0), elsewhere=other
+    )
+    assert len(present) == len(group) and any(right.any() for stages in present for _, right in stages)
+    assert absent and not any(right.any() for _, right in absent)
 
 
 def test_as_many_cases_are_made_as_are_asked_for(tmp_path, monkeypatch):

@@ -4,7 +4,8 @@ python -m imop.training.cases --out DIR --cases N --seed S [--weights FOLDER] [-
 
 A case is one step of a procedural demonstration and one scene in which it has to be done. The networks find
 its region, the search proposes motions stage by stage, and the known poses say which of them take the gripper
-to where it may go. In some set-ups the cameras are not quite where they are said to be.
+to where it may go. In some set-ups the cameras are not quite where they are said to be, and some scenes are
+others, in which nothing of what was shown is there and no candidate is right.
 """
 
 from collections.abc import Mapping, Sequence
@@ -43,6 +44,8 @@ ANSWERED = 0.7
 HINT_OFF = (0.003, 0.03)
 # Share of the cases that the search with descriptors instead of networks gives.
 REGISTERED = 0.15
+# Share of the demonstrations whose first step is also looked for where its things are not.
+ABSENT = 0.3
 # Share of the set-ups whose cameras are said to be somewhere else, and how far, metres and radians.
 MISPLACED, WRONG = 0.3, (0.003, 0.009)
 _PER_FILE = 20
@@ -72,11 +75,15 @@ def make_cases(
     found: list[list[tuple[Float32Array, BoolArray]]] = []
     matchers = LearnedMatcher(model), RegistrationMatcher(model.verification)
     streams = {v: synthetic_scenes(families, v, seed) for v in shares(mix)}
+    elsewhere: Observation | None = None
     while len(found) < count:
         variation = rng.choice(list(streams), p=list(shares(mix).values()))
-        for group in _executions(next(streams[variation])):
+        groups = _executions(next(streams[variation]))
+        for group in groups:
             matcher = matchers[int(rng.random() < REGISTERED)]
-            found += _cases(group, matcher, _SetUp.drawn(group[0].shown, rng), rng)
+            without = elsewhere if rng.random() < ABSENT else None
+            found += _cases(group, matcher, _SetUp.drawn(group[0].shown, rng), rng, without)
+        elsewhere = groups[0][0].asked.observations[0] if groups else elsewhere
     return found[:count]
 
 
@@ -85,10 +92,17 @@ def _cases(
     matcher: LearnedMatcher | RegistrationMatcher,
     set_up: "_SetUp",
     rng: np.random.Generator,
+    elsewhere: Observation | None,
 ) -> list[list[tuple[Float32Array, BoolArray]]]:
-    """The cases of one demonstration and one query, in the order of their steps."""
+    """The cases of one demonstration and one query, in the order of their steps.
+
+    Given how an execution with other things begins, the first step is looked for there, too.
+    """
     prepared = matcher.prepare(set_up.transitions(group[0].shown))
     found, answers = [], dict[int, FloatArray]()
+    if elsewhere is not None:
+        pools = prepared[0].search.pools(set_up.see(elsewhere), BEGINNING)
+        found.append([_judged(pool, None) for pool in pools if pool.motions])
     for example in group:
         progress = _progress(example, group, answers, rng)
         stages = []
@@ -167,9 +181,12 @@ def _progress(
     return Progress(off @ T)
 
 
-def _judged(pool: Pool, example: Example) -> tuple[Float32Array, BoolArray]:
+def _judged(pool: Pool, example: Example | None) -> tuple[Float32Array, BoolArray]:
+    """The inputs of a pool's candidates and which of them are right: none without an example."""
     goals = pool.goals()
     inputs = beside_rivals(pool.evidence(), goals).astype(np.float32)
+    if example is None:
+        return inputs, np.zeros(len(goals), dtype=bool)
     return inputs, right_goals(goals, example.pair.T_query_support @ example.pair.T_world_goal)
 
 
