@@ -6,7 +6,7 @@ and descriptors stand behind the same two calls, and before the same search.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol
 
@@ -135,6 +135,10 @@ class Progress:
 BEGINNING = Progress()
 
 
+def _no_points() -> FloatArray:
+    return np.zeros((0, 3))
+
+
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """One way in which the region may have moved from the demonstrated scene into the observed one.
@@ -142,7 +146,7 @@ class Candidate:
     Attributes:
         T_query_support: (4, 4) rigid motion, world frame to world frame.
         probability: 0 .. 1, of being right.
-        p_support: (K, 3) points of the region that found a counterpart.
+        p_support: (K, 3) points of the region that found a counterpart; none but for the first candidate.
         p_query: (K, 3) the counterparts.
         generator: who proposed it; see `proposals.py`.
         reachable: whether the arm can follow it; None if that was not asked.
@@ -150,8 +154,8 @@ class Candidate:
 
     T_query_support: FloatArray
     probability: float
-    p_support: FloatArray
-    p_query: FloatArray
+    p_support: FloatArray = field(default_factory=_no_points)
+    p_query: FloatArray = field(default_factory=_no_points)
     generator: str = ""
     reachable: bool | None = None
 

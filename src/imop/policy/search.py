@@ -59,9 +59,11 @@ class StepSearch:
         ranked: tuple[Candidate, ...] = ()
         for pool in self.pools(query, progress):
             ranked = self._reachable_first(pool.ranked(), feasible)
-            best = ranked[0] if ranked else None
-            if best and best.reachable is not False and best.probability >= self.sought.config.enough:
-                break
+            if ranked:
+                best, *others = ranked
+                ranked = pool.explained(best), *others
+                if best.reachable is not False and best.probability >= self.sought.config.enough:
+                    break
         return ranked
 
     def _reachable_first(

@@ -5,7 +5,7 @@ that is worth, makes a probability of it (`networks/verification.py`).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,6 +24,8 @@ from imop.types import BoolArray, FloatArray
 
 # Candidates that take the gripper farther apart than this, metres and radians, are rivals.
 ELSEWHERE = (0.02, 0.26)
+# A point that is explained by more than this has a counterpart.
+FOUND = 0.3
 
 
 class Verifier:
@@ -213,17 +215,17 @@ class Pool:
         order = np.argsort(-p, kind="stable")
         motions = np.stack(self.motions)[order]
         kept = distinct(motions, self._sought.center, len(motions))
-        return tuple(self._candidate(int(order[i]), float(p[order[i]])) for i in kept)
+        likeliest = [int(order[i]) for i in kept]
+        return tuple(Candidate(self.motions[i], float(p[i]), generator=self.generators[i]) for i in likeliest)
 
-    def _candidate(self, i: int, probability: float) -> Candidate:
-        template, T = self._sought.template, self.motions[i]
-        which = np.arange(template.size)
-        points, normals = template.moved(T[None], which)
+    def explained(self, candidate: Candidate) -> Candidate:
+        """The same with the points of the region that found a counterpart."""
+        template, which = self._sought.template, np.arange(self._sought.template.size)
+        points, normals = template.moved(candidate.T_query_support[None], which)
         found = self.target.surface.explain(points, normals, template.hue[which], template.spread[which])
-        good = np.flatnonzero(found.loose > 0.3)
+        good = np.flatnonzero(found.loose > FOUND)
         p_query = self.target.cloud.points[found.index[good]]
-        p_support = template.cloud.points[good]
-        return Candidate(T, probability, p_support, p_query, self.generators[i])
+        return replace(candidate, p_support=template.cloud.points[good], p_query=p_query)
 
     def _evidence(self, T: FloatArray) -> FloatArray:
         """(H, |EVIDENCE|) of motions (H, 4, 4); in the order of `networks.verification.EVIDENCE`."""
