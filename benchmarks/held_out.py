@@ -1,21 +1,27 @@
 """Poses predicted on things of families that no training has seen: pots, laptops, faucets, books, ropes.
 
-Two demonstrations of the same procedural scene, things placed anew: the matcher watches the first and carries
-every step's pose over to the state before the same step of the second, with its own answer to the step before
-as a hint, as the policy does. A pose is right if it is near one of
-those that the known symmetries and equal things allow. Only steps of which both sides see enough count, as in
-training. Routing is measured by benchmarks/routing.py.
+Two executions of a procedural scene, things placed anew: the matcher watches the first and carries every
+step's pose over to the state before the same step of the second, with its own answer to the step before as a
+hint, as the policy does. A pose is right if it is near one of those that the known symmetries and equal
+things allow. Only steps of which both sides see enough count, as in training. Routing is measured by
+benchmarks/routing.py.
 
-    python benchmarks/held_out.py --pairs 300 --seed 7 --json held_out.json
+    python benchmarks/held_out.py --pairs 300 --seed 1007 --json held_out.json
+    python benchmarks/held_out.py --kinds keep --pairs 100 --seed 1001 --mix 0 0 0 1     # other instances
+    python benchmarks/held_out.py --families training --seed 7                          # while developing
+
+With `--absent` the first step of every demonstration is also looked for in a scene of other things, where no
+answer is right and a refusal is wanted; benchmarks/reliability.py counts these apart.
 """
 
-import json
 import shlex
 import sys
 import time
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from itertools import count, islice
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import torch
@@ -24,27 +30,26 @@ from joblib import Parallel, delayed
 from rich.console import Console
 from rich.table import Table
 
+from imop.errors import ImopError
+from imop.evaluation.report import save_json
 from imop.evaluation.statistics import wilson
 from imop.evaluation.textbook import TextbookMatcher
 from imop.geometry import se3
 from imop.geometry.accuracy import COARSE, FINE, errors
-from imop.geometry.cloud import PointCloud
-from imop.geometry.neighbours import within
-from imop.geometry.perception import Perception
+from imop.geometry.neighbours import nearest, within
 from imop.networks.model import BUNDLED, load_model
-from imop.policy.interfaces import BEGINNING, Matcher, Progress, Transition
-from imop.policy.interfaces import Scene as Seen
+from imop.policy.interfaces import BEGINNING, Candidate, Matcher, Progress, Scene
 from imop.policy.learned import LearnedMatcher
 from imop.policy.registration import RegistrationMatcher
-from imop.robots.panda import panda_self_filter
-from imop.sim.depth_noise import DepthNoise
-from imop.training.families import HELD_OUT
-from imop.training.families.thing import revolution
-from imop.training.pairs import StepPair
-from imop.training.scenes import Scene, demonstrate, draw_scene
-from imop.training.stage import Unreachable
-from imop.training.takes import Take, is_round, make_pair
-from imop.types import Action, FloatArray, Observation
+from imop.training.families import HELD_OUT, TRAINING
+from imop.training.instances import shares
+from imop.training.set_up import SetUp
+from imop.training.synthetic import SAME_ONLY, synthetic_scenes
+from imop.training.takes import Example, executions, right_poses
+from imop.types import FloatArray, Observation
+
+PER_JOB = 10
+"""Steps that are drawn from one seed; the results do not depend on the number of processes."""
 
 
 @dataclass
@@ -54,6 +59,10 @@ class Options:
     Attributes:
         pairs: how many steps.
         seed: of the scenes.
+        families: those that no training has seen, or those that it sees.
+        kinds: comma-separated kinds of what is done (`training.plans.SHARES`); all by default.
+        mix: shares of scenes with the same things, others in colour, in shape, in both.
+        absent: whether the first steps are also looked for where their things are not.
         methods: any of learned, registration and textbook (needs the extra baselines), joined by commas.
         weights: of the learned matcher.
         json: where the results go.
@@ -62,6 +71,10 @@ class Options:
 
     pairs: int = 300
     seed: int = 7
+    families: Literal["held_out", "training"] = "held_out"
+    kinds: str = ""
+    mix: tuple[float, float, float, float] = SAME_ONLY
+    absent: bool = False
     methods: str = "learned,registration"
     weights: Path = BUNDLED
     json: Path | None = None
@@ -70,16 +83,35 @@ class Options:
 
 @dataclass(frozen=True)
 class Row:
-    """One predicted step: errors to the nearest right pose, metres and degrees."""
+    """One predicted step.
+
+    Attributes:
+        method: whose prediction.
+        scene: which one.
+        step: of the demonstration.
+        position, rotation: metres and degrees to the nearest right pose; None without an answer or where no
+            answer is right.
+        region_iou: of the region with the true one.
+        confidence: 0 .. 1; 0 without an answer.
+        seconds: to find it.
+        absent: whether the things are not in the scene.
+    """
 
     method: str
-    scene: int
+    scene: str
     step: int
-    position: float
-    rotation: float
+    position: float | None
+    rotation: float | None
     region_iou: float
     confidence: float
     seconds: float
+    absent: bool = False
+
+    def within(self, limits: tuple[float, float]) -> bool:
+        """Whether both errors are below limits, metres and degrees."""
+        if self.position is None or self.rotation is None:
+            return False
+        return self.position < limits[0] and self.rotation < limits[1]
 
 
 def make_matcher(method: str, weights: Path) -> Matcher:
@@ -90,159 +122,153 @@ def make_matcher(method: str, weights: Path) -> Matcher:
     return LearnedMatcher(load_model(weights))
 
 
-def observe(scene: Scene, rng: np.random.Generator) -> tuple[Take, list[Observation]]:
-    """A demonstration with full clouds and what the policy may see of it."""
-    states, noise = demonstrate(scene, rng), DepthNoise.sample(rng)
-    perception = Perception(panda_self_filter().is_robot)
-    observations = [scene.stage.observe(state, noise, rng) for state in states]
-    poses = tuple(scene.stage.link_poses(state) for state in states)
-    clouds = tuple(perception(observation) for observation in observations)
-    take = Take(tuple(states), tuple(observations), clouds, poses)
-    return take, [observation.stripped() for observation in observations]
+def drawn(options: Options, number: int) -> Iterator[tuple[list[Example], Observation | None]]:
+    """Executions without end, each with how one with other things begins, as soon as there was one."""
+    content = int(np.random.SeedSequence([options.seed, number]).generate_state(1)[0])
+    rng = np.random.default_rng((content, 9))
+    families = HELD_OUT if options.families == "held_out" else TRAINING
+    kinds = tuple(filter(None, options.kinds.split(",")))
+    wanted = shares(options.mix)
+    streams = {v: synthetic_scenes(families, v, content, kinds) for v in wanted}
+    elsewhere: Observation | None = None
+    while True:
+        groups = executions(next(streams[rng.choice(list(streams), p=list(wanted.values()))]))
+        for group in groups:
+            yield group, elsewhere
+        elsewhere = groups[0][0].asked.observations[0]
 
 
-def transitions(take: Take, observations: list[Observation]) -> list[Transition]:
-    seen = [Seen(o, plain(take, k)) for k, o in enumerate(observations)]
-    actions = [Action(state.T_world_gripper, state.gripper_open) for state in take.states[1:]]
-    return [Transition(a, b, action) for a, b, action in zip(seen, seen[1:], actions, strict=False)]
-
-
-def plain(take: Take, k: int) -> PointCloud:
-    """The cloud of a state as the policy begins with it, without normals and what only the truth needs."""
-    return replace(take.clouds[k], ids=None, normals=None)
-
-
-def predict(
-    matcher: Matcher,
-    method: str,
-    number: int,
-    shown: Take,
-    steps: list[Transition],
-    queries: list[Seen],
-    pairs,
-) -> Iterator[Row]:
-    prepared = matcher.prepare(steps)
-    progress = BEGINNING
-    for k, pair in pairs:
-        started = time.perf_counter()
-        found = prepared[k].locate(queries[k], progress)
-        seconds = time.perf_counter() - started
-        progress = Progress(found[0].T_query_support) if found else BEGINNING
-        T = found[0].T_query_support if found else np.eye(4)
-        goal = pair.T_world_goal
-        position, rotation = errors(T @ goal, pair.T_query_support @ goal)
-        truth = shown.clouds[k].points[pair.region]
-        yield Row(
-            method,
-            number,
-            k,
-            position,
-            float(np.degrees(rotation)),
-            iou(prepared[k].region, truth),
-            found[0].probability if found else 0,
-            seconds,
-        )
-
-
-def with_every_turn(scene: Scene, shown: Take, k: int, pair: StepPair) -> StepPair:
-    """The pair with turns of 2 degrees where a surface of revolution has, for training, turns of 30."""
-    action = scene.recipe.steps[k]
-    if action.link != "body" or not is_round(scene.stage.things[action.thing]):
-        return pair
-    axis = shown.poses[k][action.thing, "body"]
-    spun = axis @ revolution(180) @ se3.invert(axis)
-    return replace(pair, T_query_support=(pair.T_query_support[:, None] @ spun).reshape(-1, 4, 4))
-
-
-def iou(region: FloatArray, truth: FloatArray) -> float:
-    """Of two subsets of one cloud."""
-    both = within(region, truth, 1e-6).sum()
-    return float(both / (len(region) + len(truth) - both))
-
-
-def scene_rows(number: int, seed: int, methods: tuple[str, ...], weights: Path) -> list[Row]:
-    """All steps of one scene; none if the arm cannot do what was drawn."""
+def job(options: Options, number: int) -> list[Row]:
+    """The rows of all methods for some scenes."""
     torch.set_num_threads(1)
-    rng = np.random.default_rng((seed, number))
-    try:
-        scene = draw_scene(HELD_OUT, rng)
-        (shown, watched), (asked, seen) = observe(scene, rng), observe(scene, rng)
-    except Unreachable:
-        return []
-    made = [make_pair(scene, shown, asked, k) for k in range(len(scene.recipe.steps))]
-    pairs = [(e.step, with_every_turn(scene, shown, e.step, e.pair)) for e in made if e is not None]
-    steps = transitions(shown, watched)
-    queries = [Seen(observation, plain(asked, k)) for k, observation in enumerate(seen)]
     rows: list[Row] = []
-    for method in methods:
-        matcher = make_matcher(method, weights)
-        rows += predict(matcher, method, number, shown, steps, queries, pairs)
+    steps = 0
+    for i, (group, elsewhere) in enumerate(drawn(options, number)):
+        for method in options.methods.split(","):
+            rows += predict(method, options, f"{number}-{i}", group, elsewhere)
+        steps += len(group)
+        if steps >= PER_JOB:
+            break
     return rows
 
 
-def summary(rows: list[Row]) -> dict[str, object]:
-    position, rotation = (np.array([getattr(row, name) for row in rows]) for name in ("position", "rotation"))
-    fine, coarse = ((position < metres) & (rotation < degrees) for metres, degrees in (FINE, COARSE))
+def predict(
+    method: str, options: Options, scene: str, group: Sequence[Example], elsewhere: Observation | None
+) -> Iterator[Row]:
+    """The rows of one method for one demonstration and one query."""
+    set_up, progress = SetUp(), BEGINNING
+    shown = set_up.transitions(group[0].shown)
+    prepared = make_matcher(method, options.weights).prepare(shown)
+    for example in group:
+        k = example.step
+        started = time.perf_counter()
+        found = prepared[k].locate(set_up.see(example.asked.observations[k]), progress)
+        seconds = time.perf_counter() - started
+        progress = Progress(found[0].T_query_support) if found else BEGINNING
+        overlap = iou(shown[k].before, prepared[k].region, example)
+        yield Row(method, scene, k, *off(found, example), overlap, sure(found), seconds)
+    if options.absent and elsewhere is not None:
+        started = time.perf_counter()
+        found = prepared[0].locate(set_up.see(elsewhere))
+        seconds = time.perf_counter() - started
+        yield Row(method, scene, 0, None, None, 0.0, sure(found), seconds, absent=True)
+
+
+def sure(found: Sequence[Candidate]) -> float:
+    return found[0].probability if found else 0.0
+
+
+def off(found: Sequence[Candidate], example: Example) -> tuple[float | None, float | None]:
+    """Metres and degrees from the answer to the nearest right pose."""
+    if not found:
+        return None, None
+    position, rotation = errors(
+        se3.orthonormal(found[0].T_query_support @ example.pair.T_world_goal), right_poses(example)
+    )
+    return float(position), float(np.degrees(rotation))
+
+
+def iou(before: Scene, region: FloatArray, example: Example) -> float:
+    """Of the region that was found and the true one, over the points that were seen."""
+    points = before.cloud.points
+    owner = nearest(points, example.pair.support.points)[1][:, 0]
+    mine, truth = within(points, region, 1e-6), example.pair.region[owner]
+    return float((mine & truth).sum() / max((mine | truth).sum(), 1))
+
+
+def summary(rows: Sequence[Row]) -> dict[str, object]:
+    """Of one method; where no answer is right, nothing but the confidence counts."""
+    absent, asked = [row for row in rows if row.absent], [row for row in rows if not row.absent]
+    fine, coarse = (sum(row.within(limits) for row in asked) for limits in (FINE, COARSE))
+    answered = [row for row in asked if row.position is not None]
     return {
-        "n": len(rows),
-        "scenes": len({row.scene for row in rows}),
-        "within_1cm_5deg": float(fine.mean()),
-        "within_1cm_5deg_interval": wilson(int(fine.sum()), len(rows)),
-        "within_2cm_10deg": float(coarse.mean()),
-        "within_2cm_10deg_interval": wilson(int(coarse.sum()), len(rows)),
-        "position_median_m": float(np.median(position)),
-        "rotation_median_deg": float(np.median(rotation)),
-        "region_iou": float(np.mean([row.region_iou for row in rows])),
-        "seconds_median": float(np.median([row.seconds for row in rows])),
+        "n": len(asked),
+        "scenes": len({row.scene for row in asked}),
+        "within_1cm_5deg": fine / len(asked),
+        "within_1cm_5deg_interval": wilson(fine, len(asked)),
+        "within_2cm_10deg": coarse / len(asked),
+        "within_2cm_10deg_interval": wilson(coarse, len(asked)),
+        "position_median_m": float(np.median([row.position for row in answered])),
+        "rotation_median_deg": float(np.median([row.rotation for row in answered])),
+        "region_iou": float(np.mean([row.region_iou for row in asked])),
+        "seconds_median": float(np.median([row.seconds for row in asked])),
+        "absent": len(absent),
+        "absent_confidence_median": float(np.median([row.confidence for row in absent])) if absent else None,
     }
 
 
-def show(results: dict[str, dict], console: Console) -> None:
-    table = Table(title="held-out families, every step of two demonstrations of the same scene")
+def show(results: dict[str, dict], families: str, console: Console) -> None:
+    table = Table(title=f"families: {families}; every step of two executions of a scene")
     for name in ("method", "steps", "scenes", "1 cm & 5°", "2 cm & 10°", "median", "region IoU", "s/match"):
         table.add_column(name, justify="right")
     for method, s in results.items():
-        shares = [
+        spans = [
             f"{100 * s[key]:.1f} % ({100 * s[key + '_interval'][0]:.0f}-{100 * s[key + '_interval'][1]:.0f})"
             for key in ("within_1cm_5deg", "within_2cm_10deg")
         ]
         median = f"{100 * s['position_median_m']:.2f} cm {s['rotation_median_deg']:.1f}°"
-        table.add_row(
-            method,
-            str(s["n"]),
-            str(s["scenes"]),
-            *shares,
-            median,
-            f"{s['region_iou']:.2f}",
-            f"{s['seconds_median']:.2f}",
-        )
+        seen = (f"{s['region_iou']:.2f}", f"{s['seconds_median']:.2f}")
+        table.add_row(method, str(s["n"]), str(s["scenes"]), *spans, median, *seen)
     console.print(table)
+
+
+def measure(options: Options) -> dict[str, list[Row]]:
+    """At least `pairs` rows of every method.
+
+    Raises:
+        InvalidInput: for shares or kinds that there are not.
+    """
+    rows: dict[str, list[Row]] = {method: [] for method in options.methods.split(",")}
+    first = next(iter(rows.values()))
+    numbers = count()
+    while True:
+        calls = [delayed(job)(options, number) for number in islice(numbers, 2 * options.jobs)]
+        for found in Parallel(n_jobs=options.jobs)(calls):
+            for row in found:
+                rows[row.method].append(row)
+            if sum(not row.absent for row in first) >= options.pairs:
+                return rows
 
 
 def main() -> int:
     options = tyro.cli(Options, description=__doc__)
-    methods = tuple(options.methods.split(","))
-    rows: list[Row] = []
-    chunk = 8 * options.jobs
-    number = 0
-    while sum(row.method == methods[0] for row in rows) < options.pairs:
-        calls = [
-            delayed(scene_rows)(number + i, options.seed, methods, options.weights) for i in range(chunk)
-        ]
-        for found in Parallel(n_jobs=options.jobs)(calls):
-            rows += found
-        number += chunk
-    results = {method: summary([row for row in rows if row.method == method]) for method in methods}
     console = Console()
-    show(results, console if console.is_terminal else Console(width=120))
+    console = console if console.is_terminal else Console(width=120)
+    try:
+        rows = measure(options)
+    except ImopError as error:
+        console.print(f"[red]{error}")
+        return 2
+    results = {method: summary(mine) for method, mine in rows.items()}
+    show(results, options.families, console)
     if options.json:
         report = {
             "methods": results,
-            "rows": [asdict(row) for row in rows],
+            "rows": [asdict(row) for mine in rows.values() for row in mine],
             "seed": options.seed,
             "command": shlex.join(["python", *sys.argv]),
         }
-        options.json.write_text(json.dumps(report, indent=1))
+        save_json(report, options.json)
     return 0
 
 

@@ -5,7 +5,8 @@
 Reads reports of benchmarks/held_out.py and benchmarks/open_loop.py. An answer is right within 2 cm and 10
 degrees. The threshold is as high as it may be to refuse at most 5 % of the right first actions of episodes,
 where nothing is known yet of what was done before. A step without an answer has no confidence; such steps are
-only counted.
+only counted. Where the thing shown is not in the scene (held_out.py --absent), every answer is a wrong first
+action, none is a refusal, and both count nowhere else.
 """
 
 import json
@@ -61,14 +62,16 @@ class Answer:
     Attributes:
         episode: which demonstration and scene.
         step: of the demonstration.
-        confidence: 0 .. 1; None if there was no answer.
+        confidence: 0 .. 1; None if there was no answer, but 0 where none is wanted.
         right: whether a right pose is near.
+        absent: whether the things are not in the scene, so that nothing is right.
     """
 
     episode: tuple[str, ...]
     step: int
     confidence: float | None
     right: bool
+    absent: bool = False
 
 
 @dataclass(frozen=True)
@@ -118,6 +121,7 @@ class Refusals:
         wrong_first: of the wrong first actions.
         right: of all right answers.
         wrong: of all wrong answers.
+        absent: of the first actions where the things are not in the scene; they are among the wrong ones.
     """
 
     threshold: float
@@ -125,6 +129,7 @@ class Refusals:
     wrong_first: Share
     right: Share
     wrong: Share
+    absent: Share
 
 
 @dataclass(frozen=True)
@@ -132,7 +137,7 @@ class Reliability:
     """What the confidence of some answers means.
 
     Attributes:
-        right: how many of the answers are right.
+        right: how many of the answers are right, where one can be.
         confidence: its mean.
         calibration: expected calibration error.
         silent: how many steps have no answer.
@@ -174,8 +179,11 @@ def _answer(row: dict[str, Any]) -> Answer:
     parts = ("scene",) if "scene" in row else ("task", "variation", "support", "query")
     position, rotation = row["position"], row["rotation"]
     right = position is not None and position < COARSE[0] and rotation < COARSE[1]
+    episode = tuple(str(row[part]) for part in parts)
+    if row.get("absent", False):
+        return Answer((*episode, "absent"), row["step"], row["confidence"], False, True)
     # Nothing found is confidence 0 in held_out.py.
-    return Answer(tuple(str(row[part]) for part in parts), row["step"], row["confidence"] or None, right)
+    return Answer(episode, row["step"], row["confidence"] or None, right)
 
 
 def measure(found: Sequence[Answer]) -> Reliability:
@@ -184,38 +192,42 @@ def measure(found: Sequence[Answer]) -> Reliability:
     Raises:
         InvalidInput: if there is no answer among them.
     """
-    begun = {a.episode: a.step for a in sorted(found, key=lambda a: -a.step)}
     given = [a for a in found if a.confidence is not None]
-    if not given:
+    asked = [a for a in given if not a.absent]
+    if not asked:
         raise InvalidInput("reports", "no step has an answer", "at least one")
-    sure = np.array([a.confidence for a in given])
-    hit = np.array([a.right for a in given])
-    first = np.array([a.step == begun[a.episode] for a in given])
+    sure = np.array([a.confidence for a in asked])
+    hit = np.array([a.right for a in asked])
     return Reliability(
         Share(int(hit.sum()), len(hit)),
         float(sure.mean()),
         calibration_error(sure, hit.astype(float)),
         len(found) - len(given),
         [Bin(float(sure[b].mean()), Share(int(hit[b].sum()), len(b))) for b in equal_bins(sure)],
-        refusals(sure, hit, first) if (hit & first).any() else None,
+        refusals(found, given),
     )
 
 
-def refusals(sure: np.ndarray, hit: np.ndarray, first: np.ndarray) -> Refusals:
+def refusals(found: Sequence[Answer], given: Sequence[Answer]) -> Refusals | None:
     """What the highest threshold refuses that lets pass enough of the right first actions.
 
     Args:
-        sure: (N,) confidences.
-        hit: (N,) which are right.
-        first: (N,) which are first actions; at least one of them is right.
+        found: all steps; an episode begins with its first.
+        given: those with an answer.
     """
+    begun = {a.episode: a.step for a in sorted(found, key=lambda a: -a.step)}
+    sure, hit = np.array([a.confidence for a in given]), np.array([a.right for a in given])
+    first = np.array([a.step == begun[a.episode] for a in given])
+    absent = np.array([a.absent for a in given])
+    if not (hit & first).any():
+        return None
     right_first = np.sort(sure[hit & first])
     threshold = right_first[int(FALSE_ALARMS * len(right_first))]
 
     def refused(which: np.ndarray) -> Share:
         return Share(int((sure[which] < threshold).sum()), int(which.sum()))
 
-    shares = (refused(which) for which in (hit & first, ~hit & first, hit, ~hit))
+    shares = (refused(which) for which in (hit & first, ~hit & first, hit, ~hit, absent))
     return Refusals(float(threshold), *shares)
 
 
@@ -233,6 +245,7 @@ def show(results: dict[str, Reliability], console: Console) -> None:
         "wrong first",
         "right, all steps",
         "wrong, all steps",
+        "absent",
     ):
         refused.add_column(name, justify="left" if name == "answers of" else "right")
     for name, r in results.items():
@@ -240,7 +253,7 @@ def show(results: dict[str, Reliability], console: Console) -> None:
         table.add_row(name, str(r.right.of), str(r.silent), str(r.right), *numbers)
         if r.refusals:
             s = r.refusals
-            shares = (str(share) for share in (s.right_first, s.wrong_first, s.right, s.wrong))
+            shares = (str(share) for share in (s.right_first, s.wrong_first, s.right, s.wrong, s.absent))
             refused.add_row(name, f"{s.threshold:.3f}", *shares)
     console.print(table, refused)
 

@@ -66,6 +66,15 @@ def test_an_episode_begins_with_the_first_step_that_was_asked():
     assert s.wrong_first == Share(0, 0)
 
 
+def test_where_the_thing_is_not_there_every_answer_is_a_wrong_first_action():
+    right = [answer(i, 0, (i + 1) / 100, True) for i in range(20)]
+    absent = [Answer((str(i), "absent"), 0, c, False, True) for i, c in enumerate((0.0, 0.01, 0.3))]
+    alone, both = measure(right), measure([*right, *absent])
+    assert both.refusals.wrong_first == both.refusals.absent == Share(2, 3)
+    assert both.refusals.threshold == alone.refusals.threshold and alone.refusals.absent == Share(0, 0)
+    assert (both.right, both.calibration, both.bins) == (alone.right, alone.calibration, alone.bins)
+
+
 def test_without_a_right_first_action_there_is_no_threshold():
     assert measure([answer(0, 0, 0.5, False), answer(0, 1, 0.5, True)]).refusals is None
 
@@ -87,6 +96,9 @@ def test_both_kinds_of_reports_are_read(tmp_path):
         Answer(("3",), 1, 0.9, False),
         Answer(("3",), 2, None, False),
     ]
+    nowhere = {"position": None, "rotation": None, "absent": True, "confidence": 0.0}
+    one = saved(tmp_path / "c.json", {"rows": [held_out(**nowhere)]})
+    assert answers(one, "learned") == [Answer(("3", "absent"), 0, 0.0, False, True)]
     shown = ("open_drawer", "0", "1000000")
     assert answers(apart, "learned") == [
         Answer((*shown, "5"), 0, 0.9, True),

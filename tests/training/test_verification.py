@@ -7,13 +7,16 @@ import pytest
 import torch
 
 from imop.geometry import se3
+from imop.geometry.accuracy import errors
 from imop.networks.model import BUNDLED, load_model
 from imop.networks.verification import INPUTS, VerificationConfig, VerificationNetwork
 from imop.policy.learned import LearnedMatcher
 from imop.training import cases
 from imop.training.cases import Cases, make_cases, read_cases, right_goals, write_cases
 from imop.training.families import TRAINING
+from imop.training.set_up import SetUp
 from imop.training.synthetic import synthetic_scenes
+from imop.training.takes import executions, reference, right_poses
 from imop.training.verification import VerificationTraining, fit, loss
 
 
@@ -59,8 +62,20 @@ def test_candidates_near_to_a_right_pose_are_right():
 
 
 def test_between_two_turns_of_a_round_thing_everything_is_right():
-    turns = np.stack([se3.make(se3.euler(z=2 * np.pi * k / 12)) for k in range(12)])
-    assert right_goals(se3.make(se3.euler(z=np.pi / 12))[None], turns).all()
+    families = {name: TRAINING[name] for name in ("bottle", "plate")}
+    example = next(
+        example
+        for scene in synthetic_scenes(families, "same", 4)
+        for example in scene
+        if len(example.pair.T_query_support) > 2
+    )
+    thing, link = reference(example.scene, example.step)
+    T_world_thing = example.asked.poses[example.step][thing, link]
+    turn = T_world_thing @ se3.make(se3.euler(z=np.radians(17.0))) @ se3.invert(T_world_thing)
+    goal = example.pair.T_query_support[0] @ example.pair.T_world_goal
+    position, rotation = errors(turn @ goal, right_poses(example))
+    assert position < 0.01 and rotation <= np.radians(1.0) + 1e-6
+    assert right_goals(goal[None], right_poses(example)).all()
 
 
 def test_cases_are_made_again_written_and_read(tmp_path):
@@ -83,12 +98,10 @@ def test_cases_are_made_again_written_and_read(tmp_path):
 def test_nothing_is_right_where_its_things_are_not():
     families = {name: TRAINING[name] for name in ("block", "tray")}
     scenes = synthetic_scenes(families, "same", 5)
-    group = cases._executions(next(scenes))[0]
+    group = executions(next(scenes))[0]
     other = next(scenes)[0].asked.observations[0]
     matcher = LearnedMatcher(load_model(BUNDLED))
-    absent, *present = cases._cases(
-        group, matcher, cases._SetUp({}, {}), np.random.default_rng(0), elsewhere=other
-    )
+    absent, *present = cases._cases(group, matcher, SetUp(), np.random.default_rng(0), elsewhere=other)
     assert len(present) == len(group) and any(right.any() for stages in present for _, right in stages)
     assert absent and not any(right.any() for _, right in absent)
 

@@ -105,7 +105,7 @@ def _pair(shown: _Instance, asked: _Instance, step: int, labelled: bool) -> Exam
     if pair is not None and labelled:
         label = _label(shown, asked, step, members)
         pair = replace(pair, invariance=label) if has_invariant_part(label) else None
-    return None if pair is None else Example(pair, shown.take, asked.take, step)
+    return None if pair is None else Example(pair, shown.take, asked.take, step, asked.scene)
 
 
 def _label(shown: _Instance, asked: _Instance, step: int, members: list[tuple[int, str]]) -> FloatArray:

@@ -20,21 +20,18 @@ from numpy.typing import NDArray
 from imop.files import replaced
 from imop.geometry import se3
 from imop.geometry.accuracy import COARSE
-from imop.geometry.perception import Perception
-from imop.geometry.view_alignment import corrected, find_errors
 from imop.networks.model import BUNDLED, Model, load_model
-from imop.policy.interfaces import BEGINNING, Progress, Scene, Transition
+from imop.policy.interfaces import BEGINNING, Progress
 from imop.policy.learned import LearnedMatcher
 from imop.policy.registration import RegistrationMatcher
 from imop.policy.verification import Pool, beside_rivals
-from imop.robots.panda import panda_self_filter
-from imop.sim.sensing import calibration_error
 from imop.training.families import TRAINING
 from imop.training.families.thing import Family
 from imop.training.instances import shares
+from imop.training.set_up import SetUp
 from imop.training.synthetic import synthetic_scenes
-from imop.training.takes import Example, Take
-from imop.types import Action, BoolArray, Float32Array, FloatArray, Observation
+from imop.training.takes import Example, executions, right_poses
+from imop.types import BoolArray, Float32Array, FloatArray, Observation
 
 # Share of the later steps that are asked as the first of an episode, too.
 AFRESH = 0.3
@@ -46,10 +43,9 @@ HINT_OFF = (0.003, 0.03)
 REGISTERED = 0.15
 # Share of the demonstrations whose first step is also looked for where its things are not.
 ABSENT = 0.3
-# Share of the set-ups whose cameras are said to be somewhere else, and how far, metres and radians.
-MISPLACED, WRONG = 0.3, (0.003, 0.009)
+# Share of the set-ups whose cameras are said to be somewhere else.
+MISPLACED = 0.3
 _PER_FILE = 20
-_PERCEPTION = Perception(panda_self_filter().is_robot)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,11 +74,12 @@ def make_cases(
     elsewhere: Observation | None = None
     while len(found) < count:
         variation = rng.choice(list(streams), p=list(shares(mix).values()))
-        groups = _executions(next(streams[variation]))
+        groups = executions(next(streams[variation]))
         for group in groups:
             matcher = matchers[int(rng.random() < REGISTERED)]
+            set_up = SetUp.misplaced(group[0].shown, rng) if rng.random() < MISPLACED else SetUp()
             without = elsewhere if rng.random() < ABSENT else None
-            found += _cases(group, matcher, _SetUp.drawn(group[0].shown, rng), rng, without)
+            found += _cases(group, matcher, set_up, rng, without)
         elsewhere = groups[0][0].asked.observations[0] if groups else elsewhere
     return found[:count]
 
@@ -90,7 +87,7 @@ def make_cases(
 def _cases(
     group: Sequence[Example],
     matcher: LearnedMatcher | RegistrationMatcher,
-    set_up: "_SetUp",
+    set_up: SetUp,
     rng: np.random.Generator,
     elsewhere: Observation | None,
 ) -> list[list[tuple[Float32Array, BoolArray]]]:
@@ -106,58 +103,13 @@ def _cases(
     for example in group:
         progress = _progress(example, group, answers, rng)
         stages = []
-        for pool in prepared[example.step].search.pools(set_up.scene(example), progress):
+        query = set_up.see(example.asked.observations[example.step])
+        for pool in prepared[example.step].search.pools(query, progress):
             if pool.motions:
                 stages.append(_judged(pool, example))
                 answers[example.step] = pool.best(1)[0]
         found.append(stages)
     return found
-
-
-@dataclass(frozen=True, eq=False)
-class _SetUp:
-    """Cameras that may be said to be somewhere else, and what is found out about that.
-
-    Attributes:
-        T_camera_told: camera -> (4, 4) where it is said to be, in its true frame.
-        errors: as the policy finds them from the demonstration.
-    """
-
-    T_camera_told: dict[str, FloatArray]
-    errors: dict[str, FloatArray]
-
-    @classmethod
-    def drawn(cls, shown: Take, rng: np.random.Generator) -> "_SetUp":
-        """A set-up in which the demonstration was given."""
-        if rng.random() > MISPLACED:
-            return cls({}, {})
-        told = {name: calibration_error(rng, *WRONG) for name in shown.observations[0].views}
-        return cls(told, find_errors([corrected(o, told) for o in shown.observations]))
-
-    def see(self, observation: Observation) -> Scene:
-        """As the policy sees it."""
-        seen = corrected(corrected(observation, self.T_camera_told), self.errors)
-        return Scene(seen, _PERCEPTION.points(seen))
-
-    def scene(self, example: Example) -> Scene:
-        """The query of an example."""
-        return self.see(example.asked.observations[example.step])
-
-    def transitions(self, take: Take) -> list[Transition]:
-        """The steps of a demonstration."""
-        scenes = [self.see(observation) for observation in take.observations]
-        return [
-            Transition(scenes[k], scenes[k + 1], Action(state.T_world_gripper, state.gripper_open))
-            for k, state in enumerate(take.states[1:])
-        ]
-
-
-def _executions(examples: Sequence[Example]) -> list[list[Example]]:
-    """The examples of a scene by demonstration and query, in the order of their steps."""
-    groups: dict[tuple[int, int], list[Example]] = {}
-    for example in examples:
-        groups.setdefault((id(example.shown), id(example.asked)), []).append(example)
-    return list(groups.values())
 
 
 def _progress(
@@ -187,15 +139,13 @@ def _judged(pool: Pool, example: Example | None) -> tuple[Float32Array, BoolArra
     inputs = beside_rivals(pool.evidence(), goals).astype(np.float32)
     if example is None:
         return inputs, np.zeros(len(goals), dtype=bool)
-    return inputs, right_goals(goals, example.pair.T_query_support @ example.pair.T_world_goal)
+    return inputs, right_goals(goals, right_poses(example))
 
 
 def right_goals(goals: FloatArray, right: FloatArray) -> BoolArray:
-    """(H,) which poses (H, 4, 4) are one of the right ones (S, 4, 4), or between two of a round thing."""
+    """(H,) which poses (H, 4, 4) are near to one of the right ones (S, 4, 4)."""
     distance, angle = COARSE
-    round_thing = len(right) >= 12
-    limit = np.radians(max(angle, 16.0 if round_thing else 0.0))
-    return np.asarray(se3.near(goals[:, None], right[None], distance, limit).any(axis=1))
+    return np.asarray(se3.near(goals[:, None], right[None], distance, np.radians(angle)).any(axis=1))
 
 
 def write_cases(cases: Sequence[Sequence[tuple[Float32Array, BoolArray]]], path: Path) -> None:

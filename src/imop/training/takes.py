@@ -1,5 +1,6 @@
 """Pairs of two takes of a procedural scene, with the truth that only its maker knows."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,12 +47,33 @@ class Example:
         shown: the demonstration.
         asked: the execution that the query is of.
         step: its number.
+        scene: of the query.
     """
 
     pair: StepPair
     shown: Take
     asked: Take
     step: int
+    scene: Scene
+
+
+def executions(examples: Sequence[Example]) -> list[list[Example]]:
+    """The examples of a scene by demonstration and query, in the order of their steps."""
+    groups: dict[tuple[int, int], list[Example]] = {}
+    for example in examples:
+        groups.setdefault((id(example.shown), id(example.asked)), []).append(example)
+    return list(groups.values())
+
+
+def right_poses(example: Example) -> FloatArray:
+    """(S, 4, 4) where the gripper may go in the query; every 2 degrees around a surface of revolution."""
+    goals = example.pair.T_query_support @ example.pair.T_world_goal
+    thing, link = reference(example.scene, example.step)
+    if link != "body" or not is_round(example.scene.stage.things[thing]):
+        return goals
+    T_world_thing = example.asked.poses[example.step][thing, link]
+    turned = T_world_thing @ revolution(180) @ se3.invert(T_world_thing)
+    return (turned[:, None] @ goals).reshape(-1, 4, 4)
 
 
 def take(scene: Scene, rng: np.random.Generator) -> Take:
@@ -74,7 +96,7 @@ def make_pair(scene: Scene, support: Take, query: Take, step: int) -> Example | 
     before, now = support.poses[step], query.poses[step]
     members = rigid_with(reference(scene, step), before, now)
     pair = seen_pair((scene, support), (scene, query), step, members, before)
-    return None if pair is None else Example(pair, support, query, step)
+    return None if pair is None else Example(pair, support, query, step, scene)
 
 
 def seen_pair(
