@@ -10,6 +10,7 @@ import torch
 from imop.geometry import se3
 from imop.networks.graph import GraphConfig
 from imop.networks.region import RegionPrediction
+from imop.policy.interfaces import PolicyConfig
 from imop.policy.learned import find_shown_regions
 from tests.policy.scenes import BLUE, GREY, RED, TABLE, above, at, box, moved, scene, transitions
 
@@ -17,6 +18,8 @@ SPREAD = 0.007
 HOME = above(0.0, -0.3, 1.2)
 NOTE, CHEST = (0.09, 0.06, 0.02), (0.2, 0.2, 0.1)
 TOP = TABLE + 0.1
+
+USUAL = PolicyConfig()
 
 
 def model(wanted):
@@ -46,7 +49,7 @@ def everything(points):
 
 def test_what_is_taken_is_told_from_the_rest_of_the_region():
     steps, note = taking()
-    shown = find_shown_regions(model(everything), steps, 0.5)
+    shown = find_shown_regions(model(everything), steps, USUAL)
     payload = shown[0].payload
     assert payload is not None and len(payload) < 0.5 * len(shown[0].region.cloud)
     np.testing.assert_allclose(payload.points.mean(axis=0), note.points.mean(axis=0), atol=0.01)
@@ -62,7 +65,7 @@ def test_a_region_that_is_what_is_taken_needs_no_telling():
     def on_note(points):
         return np.all((points > lower) & (points < upper), axis=1) & (points[:, 2] > TOP + 0.01)
 
-    assert find_shown_regions(model(on_note), steps, 0.5)[0].payload is None
+    assert find_shown_regions(model(on_note), steps, USUAL)[0].payload is None
 
 
 @pytest.mark.parametrize("place", [(0.25, 0.1), (0.1, -0.1)])
@@ -79,7 +82,7 @@ def test_bare_ground_gives_way_to_what_stands_beside(place):
     def ground_there(points):
         return (np.linalg.norm(points[:, :2] - place, axis=1) < 0.1) & (points[:, 2] < TABLE + 0.002)
 
-    shown = find_shown_regions(model(ground_there), steps, 0.5)[0]
+    shown = find_shown_regions(model(ground_there), steps, USUAL)[0]
     assert shown.region.cloud.points[:, 2].min() > TABLE - 0.002
     height = shown.region.cloud.points[:, 2] - TABLE
     assert (height > 0.01).mean() > 0.8
@@ -87,7 +90,9 @@ def test_bare_ground_gives_way_to_what_stands_beside(place):
 
 def test_the_likeliest_few_are_the_region_if_nothing_is_likely():
     steps, _ = taking()
-    shown = find_shown_regions(model(lambda points: np.zeros(len(points), dtype=bool)), steps, 0.5)[0]
+    shown = find_shown_regions(
+        model(lambda points: np.zeros(len(points), dtype=bool)), steps, PolicyConfig()
+    )[0]
     assert len(shown.inside) >= 8 and len(shown.region.cloud)
 
 
@@ -99,7 +104,7 @@ def test_holes_in_a_thing_are_filled_and_other_things_left_alone():
     def most_of_the_chest(points):
         return (points[:, 2] > TABLE + 0.005) & (points[:, 0] < 0.15)
 
-    shown = find_shown_regions(model(most_of_the_chest), steps, 0.5)[0]
+    shown = find_shown_regions(model(most_of_the_chest), steps, USUAL)[0]
     assert shown.region.cloud.points[:, 0].max() < 0.17
     assert 0.195 < shown.completed[:, 0].max() < 0.21
     cloud = steps[0].before.cloud.points
@@ -116,7 +121,7 @@ def test_a_scrap_elsewhere_gives_way_to_what_the_gripper_goes_to(size):
     def on_scrap(points):
         return (points[:, 1] < 0.0) & (points[:, 2] > TABLE + 0.002)
 
-    region = find_shown_regions(model(on_scrap), steps, 0.5)[0].region.cloud.points
+    region = find_shown_regions(model(on_scrap), steps, USUAL)[0].region.cloud.points
     assert (region[:, 1].min() > 0.0) == (size < 0.05)
 
 
@@ -125,6 +130,8 @@ def test_what_is_out_of_focus_is_not_in_the_region():
     cloud = steps[0].before.fused
     upper = cloud.points[:, 2] > TOP - 0.002
     before = replace(steps[0].before, focus=upper)
-    shown = find_shown_regions(model(everything), [replace(steps[0], before=before), *steps[1:]], 0.5)
+    shown = find_shown_regions(
+        model(everything), [replace(steps[0], before=before), *steps[1:]], PolicyConfig()
+    )
     assert shown[0].region.cloud.points[:, 2].min() > TOP - 0.02
     assert shown[1].region.cloud.points[:, 2].min() < TOP - 0.05

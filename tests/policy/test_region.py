@@ -3,6 +3,7 @@
 import numpy as np
 
 from imop.geometry import se3
+from imop.policy.interfaces import PolicyConfig
 from imop.policy.region import find_regions
 from tests.policy.scenes import BLUE, GREEN, RED, TABLE, above, at, box, moved, scene, transitions
 
@@ -12,6 +13,10 @@ HOME = above(0.0, -0.3, 1.2)
 GRASP = above(0.1, 0.1, TABLE + 0.04)
 LIFT = above(0.1, 0.1, TABLE + 0.24)
 PLACE = above(0.4, -0.1, TABLE + 0.06)
+
+
+def found(steps):
+    return find_regions(steps, PolicyConfig())
 
 
 def is_like(region, color):
@@ -32,16 +37,16 @@ def pick_and_place():
 
 
 def test_approach_and_grasp_refer_to_what_is_grasped():
-    regions = find_regions(pick_and_place())
+    regions = found(pick_and_place())
     assert is_like(regions[0], RED) and is_like(regions[1], RED)
 
 
 def test_lift_refers_to_what_is_in_the_hand():
-    assert is_like(find_regions(pick_and_place())[2], RED)
+    assert is_like(found(pick_and_place())[2], RED)
 
 
 def test_placing_refers_to_where_it_is_placed_and_leaves_the_held_thing_out():
-    region = find_regions(pick_and_place())[3]
+    region = found(pick_and_place())[3]
     assert is_like(region, GREEN)
     p_gripper_cube = se3.apply(se3.invert(GRASP), box(CUBE, RED, at(0.1, 0.1)).points)
     assert len(region.p_gripper_held) > 0.8 * len(p_gripper_cube)
@@ -52,7 +57,7 @@ def test_weight_is_largest_near_the_contact():
     long = box((0.04, 0.4, 0.04), RED, at(0.2, 0.0))
     contact = above(0.2, 0.18, TABLE + 0.02)
     scenes = [scene([long], HOME), scene([long], contact, 0.5)]
-    region = find_regions(transitions(scenes, [(contact, False)]))[0]
+    region = found(transitions(scenes, [(contact, False)]))[0]
     near = np.linalg.norm(region.cloud.points - contact[:3, 3], axis=1)
     assert np.corrcoef(near, region.weight)[0, 1] < -0.9
     assert region.weight.min() > 0 and region.weight.max() <= 1
@@ -63,7 +68,7 @@ def test_a_part_that_hangs_in_the_air_is_taken_with_what_carries_it():
     handle = box((0.03, 0.08, 0.02), RED, at(0.3, 0.0, TABLE + 0.2) @ se3.make(p=(-0.16, 0, 0)))
     contact = above(0.14, 0.0, TABLE + 0.21)
     scenes = [scene([case, handle], HOME), scene([case, handle], contact, 0.5)]
-    region = find_regions(transitions(scenes, [(contact, False)]))[0]
+    region = found(transitions(scenes, [(contact, False)]))[0]
     red = region.cloud.colors[:, 0] > 0.5
     assert red.sum() == len(handle) and (~red).sum() > 0.9 * len(case)
 
@@ -72,13 +77,13 @@ def test_press_without_a_grasp_refers_to_what_the_tip_touches():
     button, other = box((0.06, 0.06, 0.03), RED, at(0.2, 0.2)), box(CUBE, BLUE, at(0.2, -0.2))
     ready, pressed = above(0.2, 0.2, TABLE + 0.15), above(0.2, 0.2, TABLE + 0.03)
     scenes = [scene([button, other], T, 0.0) for T in (HOME, ready, pressed)]
-    regions = find_regions(transitions(scenes, [(ready, False), (pressed, False)]))
+    regions = found(transitions(scenes, [(ready, False), (pressed, False)]))
     assert is_like(regions[0], RED) and is_like(regions[1], RED)
 
 
 def test_bare_table_still_gives_a_region():
     scenes = [scene([], HOME), scene([], GRASP, 0.5)]
-    region = find_regions(transitions(scenes, [(GRASP, False)]))[0]
+    region = found(transitions(scenes, [(GRASP, False)]))[0]
     assert len(region.cloud) and len(region.weight) == len(region.cloud)
 
 
@@ -88,7 +93,7 @@ def test_closing_on_nothing_is_not_a_grasp():
     poses.append(above(0.2, -0.2, TABLE + 0.03))
     openings = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     scenes = [scene([first, second], T, w) for T, w in zip([HOME, *poses], openings, strict=True)]
-    regions = find_regions(transitions(scenes, [(T, False) for T in poses]))
+    regions = found(transitions(scenes, [(T, False) for T in poses]))
     assert [is_like(region, RED) for region in regions] == [True, True, True, False, False]
     assert is_like(regions[3], BLUE) and is_like(regions[4], BLUE)
 
@@ -96,9 +101,7 @@ def test_closing_on_nothing_is_not_a_grasp():
 def test_what_is_next_to_a_place_is_a_part_of_the_region_around_its_nearest_point():
     long = box((0.04, 0.4, 0.04), RED, at(0.2, 0.0))
     contact = above(0.2, 0.18, TABLE + 0.02)
-    region = find_regions(
-        transitions([scene([long], HOME), scene([long], contact, 0.5)], [(contact, False)])
-    )[0]
+    region = found(transitions([scene([long], HOME), scene([long], contact, 0.5)], [(contact, False)]))[0]
     part = region.next_to(np.array([0.2, 0.5, TABLE]), 0.05)
     assert 0 < len(part.cloud) == len(part.weight) < len(region.cloud)
     assert np.ptp(part.cloud.points[:, 1]) <= 0.05

@@ -81,7 +81,7 @@ def first_region(model: Model, demonstration: Demonstration) -> Region:
         Transition(before, after, keyframe.action)
         for before, after, keyframe in zip(scenes, scenes[1:], seen.keyframes, strict=False)
     ]
-    return find_shown_regions(model, steps, PolicyConfig().threshold)[0].region
+    return find_shown_regions(model, steps, PolicyConfig())[0].region
 
 
 def save_spreads(panels: list[Panel], path: Path) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from imop.errors import MissingExtra
 from imop.geometry.cloud import PointCloud
-from imop.policy.interfaces import BEGINNING, Candidate, Feasible, Progress, Scene, Transition
+from imop.policy.interfaces import BEGINNING, Candidate, Feasible, PolicyConfig, Progress, Scene, Transition
 from imop.policy.region import Region, find_regions
 from imop.policy.target import without_held
 from imop.types import FloatArray
@@ -49,7 +49,7 @@ class TextbookMatcher:
 
     def prepare(self, steps: Sequence[Transition]) -> list["TextbookStep"]:
         """Find the regions of a demonstration and describe them."""
-        regions = find_regions(steps)
+        regions = find_regions(steps, PolicyConfig())
         return [TextbookStep(self, region) for region in regions]
 
     def describe(self, cloud: PointCloud) -> tuple[Any, Any]:

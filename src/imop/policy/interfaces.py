@@ -37,7 +37,18 @@ class PolicyConfig:
         tight, loose: matches nearer than this to where a motion carries them speak for it, metres.
         next_to: what of the region is this near to where the gripper goes is a part of its own, metres.
         same_motion: motions nearer to each other than this, metres and radians, are judged once.
-        fewest: a thing of fewer points is none.
+        fewest: a thing of fewer points is none, and fits anywhere.
+        alone: a part of the region is looked for on its own if it is less than this share of the region.
+        known: what the hand takes is told from the rest of the region if the region has this share of it.
+        lets_go: share of what is held in the region of a step that lets go from which nothing else is in it.
+        scrap, farther: a region of fewer points is not believed if it is farther from where the gripper goes
+            than something else is, by so many metres.
+        connected: what is connected to the region, this near to it (metres), is its context.
+        borrowed: what hangs in the air or is too small is taken with what lies this near to it, metres.
+        standing: lowest point of something that stands on the ground, metres.
+        fading, least: weight of a point of a region without networks falls with its distance from the
+            contact on this scale, metres, to this.
+        laid: points of a part that are laid onto the scene, first and last.
         compared: points of the region, of its context, and of what was observed around it, that are compared.
         glanced: points of the region and of its context that are compared at a glance.
         keypoints: points of the region, and of a scene, that registration describes.
@@ -59,6 +70,17 @@ class PolicyConfig:
     next_to: float = 0.05
     same_motion: tuple[float, float] = (0.002, 0.02)
     fewest: int = 30
+    alone: float = 0.8
+    known: float = 0.5
+    lets_go: float = 0.8
+    scrap: int = 100
+    farther: float = 0.05
+    connected: float = 0.1
+    borrowed: tuple[float, ...] = (0.04, 0.08, 0.16, 0.3)
+    standing: float = 0.04
+    fading: float = 0.15
+    least: float = 0.2
+    laid: tuple[int, int] = (250, 1000)
     compared: tuple[int, int, int] = (400, 150, 200)
     glanced: tuple[int, int] = (100, 40)
     keypoints: tuple[int, int] = (800, 2500)

@@ -23,23 +23,13 @@ from imop.networks.region import StepBatch, one_step
 from imop.policy.contacts import SAME, Contacts, find_contacts, is_open
 from imop.policy.interfaces import BEGINNING, Candidate, Feasible, PolicyConfig, Progress, Scene, Transition
 from imop.policy.proposals import Asked, Matches
-from imop.policy.region import ENOUGH, Region, find_region
+from imop.policy.region import Region, find_region
 from imop.policy.search import StepSearch
 from imop.policy.verification import Verifier
 from imop.types import FloatArray
 
 # A region of fewer points cannot be matched.
 FEWEST = 8
-# Share of what is held in the region of a step that lets go from which nothing else is in it.
-LETS_GO = 0.8
-# What is connected to the region, this near to it (metres), is its context.
-AROUND = 0.1
-# What the hand takes is told from the rest of the region if the region has this share of it, and if it is
-# less than this share of the region.
-KNOWN, MUCH_MORE = 0.5, 0.8
-# A region of fewer points is a scrap. It is not believed if it is farther from where the gripper goes than
-# something else is, by this much, metres.
-SCRAP, FARTHER = 100, 0.05
 # Points nearer to each other than this are of one voxel or of neighbours, metres.
 NEXT = 0.006
 
@@ -86,7 +76,7 @@ class LearnedMatcher:
 
     def prepare(self, steps: Sequence[Transition]) -> list["LearnedStep"]:
         """Find the regions of a demonstration's steps and describe them."""
-        shown = find_shown_regions(self.model, steps, self.config.threshold)
+        shown = find_shown_regions(self.model, steps, self.config)
         return [
             LearnedStep(self.model, self.config, step, region)
             for step, region in zip(steps, shown, strict=True)
@@ -135,20 +125,12 @@ class LearnedStep:
         return Asked({"fit": fit, "firm": firm}, matches)
 
 
-def find_shown_regions(model: Model, steps: Sequence[Transition], threshold: float) -> list[ShownRegion]:
-    """The region of every step of one demonstration.
-
-    Args:
-        model: with the region network.
-        steps: of the demonstration.
-        threshold: least probability of a region point.
-    """
+def find_shown_regions(model: Model, steps: Sequence[Transition], config: PolicyConfig) -> list[ShownRegion]:
+    """The region of every step of one demonstration, by the region network."""
     objects = [find_objects(step.before.cloud, step.before.ground.plane) for step in steps]
     contacts = find_contacts(steps, objects)
-    return [
-        _find(model, steps, k, contacts, threshold, find_region(steps, k, objects[k], contacts).cloud.points)
-        for k in range(len(steps))
-    ]
+    instead = [find_region(steps, k, objects[k], contacts, config).cloud for k in range(len(steps))]
+    return [_find(model, steps, k, contacts, config, instead[k].points) for k in range(len(steps))]
 
 
 def _find(
@@ -156,33 +138,32 @@ def _find(
     steps: Sequence[Transition],
     k: int,
     contacts: Contacts,
-    threshold: float,
+    config: PolicyConfig,
     instead: FloatArray,
 ) -> ShownRegion:
     """The region of step `k`, or what is at points (M, 3) `instead` if that cannot be the region."""
-    step, config = steps[k], model.config.graph
-    before, after = (build_graph(s.cloud, config, s.ground) for s in (step.before, step.after))
-    batch = _batch(step, before, after, config.neighbours)
+    step, shape = steps[k], model.config.graph
+    before, after = (build_graph(s.cloud, shape, s.ground) for s in (step.before, step.after))
+    batch = _batch(step, before, after, shape.neighbours)
     with torch.inference_mode():
         predicted = model.region(batch)
     nodes = before.points.double().numpy()
     meant = torch.from_numpy(step.before.focused(nodes, SAME))
     probability = torch.where(meant, predicted.probability, 0.0) if meant.any() else predicted.probability
-    inside = _likely(probability, threshold)
+    inside = _likely(probability, config.threshold)
     standing = ~step.before.ground.bare[nearest(nodes, step.before.cloud.points)[1][:, 0]]
     p_held = contacts.p_gripper_held[k]
-    region = _dense(step, nodes, probability.double().numpy(), inside, p_held)
+    region = _dense(step, nodes, probability.double().numpy(), inside, p_held, config)
     beside = np.flatnonzero(within(nodes, instead, SAME) & standing)
     # The ground is the same everywhere, and a scrap somewhere else says nothing about this place.
     nothing = standing[inside].sum() < FEWEST
-    scrap = len(region.cloud) < SCRAP and _away(step, p_held, region.cloud.points) > FARTHER + _away(
-        step, p_held, instead
-    )
+    farther = _away(step, p_held, region.cloud.points) - _away(step, p_held, instead)
+    scrap = len(region.cloud) < config.scrap and farther > config.farther
     if len(beside) >= FEWEST and (nothing or scrap):
         inside = torch.from_numpy(beside)
-        region = _dense(step, nodes, probability.double().numpy(), inside, p_held)
-    payload = _payload(step, region, contacts.taken(k, steps))
-    points = _completed(step, nodes, probability, region, threshold)
+        region = _dense(step, nodes, probability.double().numpy(), inside, p_held, config)
+    payload = _payload(step, region, contacts.taken(k, steps), config)
+    points = _completed(step, nodes, probability, region, config.threshold)
     owner = nearest(region.cloud.points, nodes)[1][:, 0]
     region = replace(region, spread=predicted.spread.double().numpy()[owner])
     return ShownRegion(batch, probability, predicted.trust, inside, region, points, payload)
@@ -209,7 +190,12 @@ def _likely(probability: Tensor, threshold: float) -> Tensor:
 
 
 def _dense(
-    step: Transition, nodes: FloatArray, probability: FloatArray, inside: Tensor, p_gripper_held: FloatArray
+    step: Transition,
+    nodes: FloatArray,
+    probability: FloatArray,
+    inside: Tensor,
+    p_gripper_held: FloatArray,
+    config: PolicyConfig,
 ) -> Region:
     """The region on the full cloud: every point belongs as much as the nearest of `nodes` (N, 3) does."""
     cloud = step.before.cloud
@@ -223,7 +209,7 @@ def _dense(
     p_held = se3.apply(step.before.observation.T_world_gripper, p_gripper_held)
     in_hand = within(cloud.points, p_held, SAME)
     # A step that lets go is fixed to what stays, not to what is let go.
-    most = LETS_GO if step.action.gripper_open else 0.5
+    most = config.lets_go if step.action.gripper_open else 0.5
     if (member & ~in_hand).sum() >= FEWEST and in_hand[member].mean() < most:
         member = member & ~in_hand
     else:
@@ -232,7 +218,7 @@ def _dense(
     free = np.flatnonzero(standing & ~in_hand | member)
     labels, own = connected(cloud.points[free]), member[free]
     # What only stands by says nothing about the region.
-    around = ~own & np.isin(labels, labels[own]) & within(cloud.points[free], region.points, AROUND)
+    around = ~own & np.isin(labels, labels[own]) & within(cloud.points[free], region.points, config.connected)
     context = cloud.select(free[around]) if around.any() else None
     return Region(region, weight[owner[member]], p_gripper_held, context)
 
@@ -256,13 +242,16 @@ def _completed(
     return np.unique(np.concatenate([region.cloud.points, rest[mean[labels] > threshold]]), axis=0)
 
 
-def _payload(step: Transition, region: Region, p_taken: FloatArray) -> PointCloud | None:
+def _payload(
+    step: Transition, region: Region, p_taken: FloatArray, config: PolicyConfig
+) -> PointCloud | None:
     """What the hand takes next, at points (H, 3), if the region is much more than that."""
-    if len(p_taken) < ENOUGH or within(p_taken, region.cloud.points, SAME).mean() < KNOWN:
+    known = within(p_taken, region.cloud.points, SAME)
+    if len(p_taken) < config.fewest or known.mean() < config.known:
         return None
     cloud = step.before.cloud.select(within(step.before.cloud.points, p_taken, NEXT))
-    small = len(cloud) < ENOUGH or within(region.cloud.points, cloud.points, SAME).mean() > MUCH_MORE
-    return None if small else cloud
+    taken = within(region.cloud.points, cloud.points, SAME)
+    return None if len(cloud) < config.fewest or taken.mean() > config.alone else cloud
 
 
 def likeliest(

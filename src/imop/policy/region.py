@@ -18,20 +18,11 @@ from imop.geometry.clusters import Objects, find_objects
 from imop.geometry.neighbours import nearest, within
 from imop.networks.region import trust
 from imop.policy.contacts import SAME, Contacts, find_contacts, leaving
-from imop.policy.interfaces import Transition
+from imop.policy.interfaces import PolicyConfig, Transition
 from imop.types import BoolArray, FloatArray
 
-# Weight of a point of the region falls with its distance from the contact; scale in metres.
-FADING = 0.15
-LEAST_WEIGHT = 0.2
-# Lowest point of something that stands on the plane, metres; what is higher is fixed to something else.
-STANDING = 0.04
 # What is taken for the spread of points of which nothing is known, metres.
 UNKNOWN = 0.01
-# A cluster of fewer points (of a 5 mm grid) fits anywhere.
-ENOUGH = 30
-# What hangs in the air or is too small is taken with what lies this near to it, metres.
-BORROWING = (0.04, 0.08, 0.16, 0.3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,14 +69,16 @@ class Region:
         return Region(self.cloud.select(near), self.weight[near], self.p_gripper_held)
 
 
-def find_regions(steps: Sequence[Transition]) -> list[Region]:
+def find_regions(steps: Sequence[Transition], config: PolicyConfig) -> list[Region]:
     """The region of every step of one demonstration."""
     objects = [find_objects(step.before.cloud, step.before.ground.plane) for step in steps]
     contacts = find_contacts(steps, objects)
-    return [find_region(steps, k, objects[k], contacts) for k in range(len(steps))]
+    return [find_region(steps, k, objects[k], contacts, config) for k in range(len(steps))]
 
 
-def find_region(steps: Sequence[Transition], k: int, objects: Objects, contacts: Contacts) -> Region:
+def find_region(
+    steps: Sequence[Transition], k: int, objects: Objects, contacts: Contacts, config: PolicyConfig
+) -> Region:
     """The region of step `k`; `objects` are those of its support state."""
     T_world_gripper = steps[k].before.observation.T_world_gripper
     p_held = contacts.p_gripper_held[k]
@@ -105,9 +98,9 @@ def find_region(steps: Sequence[Transition], k: int, objects: Objects, contacts:
     p_contact = se3.apply(T_contact, touched)
     distance, index = nearest(p_contact, rest.cloud.points)
     member = rest.labels == rest.labels[index[np.argmin(distance)]]
-    cloud = rest.cloud.select(member if in_hand else _with_support(rest, member))
+    cloud = rest.cloud.select(member if in_hand else _with_support(rest, member, config))
     away, _ = nearest(cloud.points, p_contact)
-    weight = np.maximum(np.exp(-0.5 * (away[:, 0] / FADING) ** 2), LEAST_WEIGHT)
+    weight = np.maximum(np.exp(-0.5 * (away[:, 0] / config.fading) ** 2), config.least)
     return Region(cloud, weight, p_held if held.any() else np.zeros((0, 3)))
 
 
@@ -130,11 +123,11 @@ def _nearest_pass(steps: Sequence[Transition], objects: Objects) -> FloatArray:
     return steps[int(np.argmin(distance))].action.T_world_gripper
 
 
-def _with_support(objects: Objects, member: BoolArray) -> BoolArray:
+def _with_support(objects: Objects, member: BoolArray, config: PolicyConfig) -> BoolArray:
     """(N,) the cluster, and if it hangs in the air what is around it: it must be fixed to something."""
     points = objects.cloud.points
-    for reach in BORROWING:
-        if member.sum() >= ENOUGH and objects.height[member].min() < STANDING:
+    for reach in config.borrowed:
+        if member.sum() >= config.fewest and objects.height[member].min() < config.standing:
             break
         near = within(points, points[member], reach)
         member = np.isin(objects.labels, np.unique(objects.labels[near]))

@@ -53,7 +53,7 @@ class RegistrationMatcher:
 
     def prepare(self, steps: Sequence[Transition]) -> list["RegisteredStep"]:
         """Find the regions of a demonstration and describe them."""
-        regions = find_regions(steps)
+        regions = find_regions(steps, self.config)
         return [RegisteredStep(self, step, region) for step, region in zip(steps, regions, strict=True)]
 
     def describe(self, cloud: PointCloud, count: int) -> tuple[PointCloud, FloatArray]:

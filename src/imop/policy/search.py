@@ -41,7 +41,9 @@ class StepSearch:
         before, T_goal = step.before, step.action.T_world_gripper
         views = tuple(before.observation.views.values())
         standing = before.cloud.select(~before.ground.bare)
-        template = Template(region, T_goal[:3, 3], _beside(standing, T_goal, region), views, config, payload)
+        template = Template(
+            region, T_goal[:3, 3], _beside(standing, T_goal, region, config), views, config, payload
+        )
         parts = _parts(region, payload, T_goal[:3, 3], config)
         turns = equal_turns(region.cloud)
         self.sought, self._ask = Sought(config, step, region, template, parts, turns, verifier), ask
@@ -163,25 +165,26 @@ def _parts(
 ) -> tuple[Part, ...]:
     """The region itself, what of it stays in place, what is next to the gripper, and what it takes."""
     points = region.cloud.points
+    coarse, fine = config.laid
     rng = np.random.default_rng(0)
     share = region.trust / region.trust.sum()
-    drawn = rng.choice(len(points), min(1000, 4 * len(points)), p=share)
-    parts = [_part("region", 0, points), Part("firm", 3, points[drawn[:250]], points[drawn])]
+    drawn = rng.choice(len(points), min(fine, 4 * len(points)), p=share)
+    parts = [_part("region", 0, points, config), Part("firm", 3, points[drawn[:coarse]], points[drawn])]
     near = region.next_to(p_goal, config.next_to).cloud.points
-    if SMALLEST <= len(near) < 0.8 * len(points):
-        parts.append(_part("part", 2, near))
+    if SMALLEST <= len(near) < config.alone * len(points):
+        parts.append(_part("part", 2, near, config))
     if payload is not None:
-        parts.append(_part("payload", 4, payload.points))
+        parts.append(_part("payload", 4, payload.points, config))
     return tuple(parts)
 
 
-def _part(name: str, column: int, points: FloatArray) -> Part:
-    coarse, fine = farthest_points(points, 250), farthest_points(points, 1000)
-    return Part(name, column, points[coarse], points[fine])
+def _part(name: str, column: int, points: FloatArray, config: PolicyConfig) -> Part:
+    coarse, fine = (points[farthest_points(points, count)] for count in config.laid)
+    return Part(name, column, coarse, fine)
 
 
-def _beside(standing: PointCloud, T_goal: FloatArray, region: Region) -> PointCloud:
+def _beside(standing: PointCloud, T_goal: FloatArray, region: Region, config: PolicyConfig) -> PointCloud:
     """What stands around the place that the tip goes to; the region if nothing does."""
     near = np.linalg.norm(standing.points - T_goal[:3, 3], axis=1) < BESIDE
     cloud = standing.select(near) if near.any() else region.cloud
-    return cloud.select(farthest_points(cloud.points, 150))
+    return cloud.select(farthest_points(cloud.points, config.compared[1]))
