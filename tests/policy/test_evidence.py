@@ -8,7 +8,7 @@ from imop.geometry.cloud import concatenate
 from imop.networks.verification import EVIDENCE
 from imop.policy.evidence import Template, glance, palette, pattern, shares
 from imop.policy.interfaces import PolicyConfig
-from imop.policy.region import Region
+from imop.policy.region import Goal, Region
 from imop.policy.target import OFFSET, Surface, shades
 from tests.policy.scenes import BLUE, GREEN, RED, at, box, camera, moved
 
@@ -49,7 +49,7 @@ def test_a_glance_prefers_the_true_motion_in_every_column():
     cloud, T = box(SIZE, RED), at(0.2, 0.1, yaw=1.0)
     template = Template(region(cloud), GOAL, cloud, (), PolicyConfig())
     looks = glance(template, Surface(moved(cloud, T), ()), np.stack([T, at(0.03, 0.0, 0.0) @ T]))
-    assert looks.shape == (2, 5) and (looks[0] > looks[1]).all() and (looks[0] > 0.8).all()
+    assert looks.shape == (2, 6) and (looks[0] > looks[1]).all() and (looks[0] > 0.8).all()
 
 
 def test_what_may_differ_is_explained_loosely():
@@ -203,3 +203,22 @@ def test_colours_are_in_the_palette_of_a_scene_wherever_they_are():
         palette(template, Surface(cloud, ())) for cloud in (both, red, box(SIZE, BLUE))
     )
     assert everywhere > 0.99 > 0.9 > half > 0.5 > 0.1 > nothing
+
+
+def test_the_goal_tells_apart_what_the_region_does_not():
+    """Two motions that explain the region, of which one also explains what stands where the hand goes."""
+    held, goal = box(SIZE, RED), moved(box(SIZE, BLUE), at(0.2, 0.0, 0.0))
+    stands = Goal(goal, np.ones(len(goal)), goal.points)
+    template = Template(region(held), GOAL, goal, (camera(),), PolicyConfig(), goal=stands)
+    query = concatenate([held, moved(held, at(0.0, 0.3, 0.0)), moved(goal, at(0.0, 0.3, 0.0))])
+    rows = shares(template, Surface(query, (camera(FAR),)), np.stack([np.eye(4), at(0.0, 0.3, 0.0)]))
+    elsewhere, right = (dict(zip(EVIDENCE, row, strict=False)) for row in rows)
+    assert min(elsewhere["region_exact"], right["region_exact"]) > 0.85
+    assert right["goal_exact"] > 0.85 > 0.1 > elsewhere["goal_exact"]
+    assert elsewhere["goal_absent"] > 0.1 and right["goal_absent"] == 0
+
+
+def test_the_region_stands_for_a_goal_that_is_not_apart():
+    found = evidence(box(SIZE, RED), box(SIZE, RED, seed=1))
+    for name in ("exact", "loose", "color", "clash", "hidden", "absent"):
+        assert found[f"goal_{name}"] == pytest.approx(found[f"near_{name}"])

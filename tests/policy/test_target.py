@@ -6,9 +6,10 @@ import numpy as np
 
 from imop.geometry import se3
 from imop.geometry.cloud import concatenate
+from imop.policy.interfaces import PolicyConfig
 from imop.policy.region import Region
-from imop.policy.target import Target, middle, thing_of, without_held
-from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, scene
+from imop.policy.target import Target, find_goal, middle, thing_of, without_held
+from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, camera, scene, transitions
 
 SIZE = (0.1, 0.05, 0.06)
 HOME = above(0.2, 0.1, 1.0)
@@ -56,3 +57,43 @@ def test_the_thing_of_a_part_is_all_that_is_connected_to_it():
     standing = concatenate([one, other]).points
     assert len(thing_of(one.points[:20], standing)) == len(one)
     assert thing_of(one.points, standing[:0]) is one.points
+
+
+def pushed(onto=(0.3, 0.1)):
+    """A red cube is pushed from (0.1, 0.1) to beside a blue one, under a camera that then sees 9 m deep."""
+    goal = box(CUBE, BLUE, at(*onto))
+    places = [box(CUBE, RED, at(x, 0.1)) for x in (0.1, 0.26)]
+    hands = [above(x, 0.1, TABLE + 0.02) for x in (0.07, 0.23)]
+    scenes = [scene([place, goal], hand) for place, hand in zip(places, hands, strict=True)]
+    view = camera(np.full((64, 64), 9.0, np.float32))
+    scenes[1] = replace(scenes[1], observation=replace(scenes[1].observation, views={"top": view}))
+    step = transitions(scenes, [(scenes[1].observation.T_world_gripper, False)])[0]
+    return step, Region(places[0], np.ones(len(places[0])), np.zeros((0, 3)))
+
+
+def test_the_goal_is_what_stands_where_the_hand_goes_and_stays_there():
+    step, region = pushed()
+    goal = find_goal(step, region, PolicyConfig())
+    assert np.allclose(goal.cloud.colors, np.array(BLUE, np.float32))
+    assert goal.weight.max() == 1 and len(goal.thing) >= len(goal.cloud)
+    away = np.linalg.norm(goal.cloud.points - step.action.T_world_gripper[:3, 3], axis=1)
+    assert (np.diff(goal.weight[away.argsort()]) <= 0).all()
+
+
+def test_what_is_only_hidden_afterwards_still_stands_there():
+    step, region = pushed()
+    after = replace(step.after, fused=step.after.fused.select(np.arange(400)))
+    hidden, seen_through = (
+        replace(step, after=replace(after, observation=replace(after.observation, views={"top": camera(d)})))
+        for d in (np.full((64, 64), depth, np.float32) for depth in (0.5, 9.0))
+    )
+    assert find_goal(hidden, region, PolicyConfig()) is not None
+    assert find_goal(seen_through, region, PolicyConfig()) is None
+
+
+def test_there_is_no_goal_far_away_and_none_beside_the_region():
+    step, _ = pushed()
+    blue = step.before.cloud.select(step.before.cloud.colors[:, 2] > 0.6)
+    assert find_goal(step, Region(blue, np.ones(len(blue)), np.zeros((0, 3))), PolicyConfig()) is None
+    step, region = pushed(onto=(0.5, 0.1))
+    assert find_goal(step, region, PolicyConfig()) is None

@@ -11,8 +11,9 @@ from torch import Tensor, nn
 
 from imop.networks.blocks import Standardized
 
-WEIGHTINGS = ("region", "near", "firm", "taken")
-"""All points of the region, those next to the gripper, those that stay in place, and what the hand takes."""
+WEIGHTINGS = ("region", "near", "firm", "taken", "goal")
+"""All points of the region, those next to the gripper, those that stay in place, what the hand takes, and
+what stands where it goes."""
 
 EVIDENCE = (
     *(
@@ -28,6 +29,7 @@ EVIDENCE = (
     *("tilt", "rise", "begun", "hint_away", "hint_turn", "gripper_away", "gripper_turn"),
     *("held", "opens", "opening", "size", "points", "certainty", "spread", "near_spread", "turns", "marks"),
     "palette",
+    "apart",
 )
 """What is known of a candidate on its own."""
 RIVALRY = (
@@ -35,6 +37,7 @@ RIVALRY = (
     "near_loose",
     "firm_loose",
     "taken_loose",
+    "goal_loose",
     "matches_loose",
     "pattern",
     "alike",

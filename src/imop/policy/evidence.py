@@ -16,7 +16,7 @@ from imop.geometry.cloud import PointCloud, concatenate, farthest_points
 from imop.geometry.neighbours import within
 from imop.policy.contacts import SAME
 from imop.policy.interfaces import PolicyConfig
-from imop.policy.region import Region
+from imop.policy.region import Goal, Region, fading
 from imop.policy.target import BESIDE, OFFSET, SHADE, Explained, Surface, shades
 from imop.types import CameraView, FloatArray
 
@@ -25,8 +25,6 @@ AROUND = 0.04
 # Colours that agree less than this contradict each other. What their pattern explains is told from noise of
 # this variance.
 CLASH, NOISE = 0.1, 0.02
-# What is next to the gripper: scale of the weights, metres.
-NEXT = 0.05
 
 
 class Template:
@@ -39,13 +37,15 @@ class Template:
         views: of the demonstrated scene.
         config: says how many points are compared.
         payload: what the hand takes next, if that is less than the region.
+        goal: what stands where the action goes, if that is not the region.
 
     Attributes:
-        cloud: points of the region, `size` of them, then of its context.
+        cloud: points of the region, `size` of them, then of its context, then of the goal.
         glance: those that are compared at a glance.
         backward: how many observed points are compared with the region.
         hue, spread: (M, 4) shades and (M,) spread of them.
-        weights: (M, 5), see `_weights`.
+        weights: (M, 6) of the region, near the gripper, of what stays in place, of what is taken, of the
+            goal, of the context.
         marks: variance of the region's shades.
     """
 
@@ -57,47 +57,31 @@ class Template:
         views: Sequence[CameraView],
         config: PolicyConfig,
         payload: PointCloud | None = None,
+        goal: Goal | None = None,
     ) -> None:
         own, others, self.backward = config.compared
-        chosen, few = farthest_points(region.cloud.points, own), np.zeros(0, dtype=np.int64)
-        parts = [region.cloud.select(chosen)]
-        if region.context is not None:
-            few = farthest_points(region.context.points, others)
-            parts.append(region.context.select(few))
-        self.cloud = concatenate(parts)
+        chosen = farthest_points(region.cloud.points, own)
+        weights = [_weights(region, chosen, p_goal, payload, goal is None)]
+        parts, looks = [region.cloud.select(chosen)], [np.arange(len(chosen)) < config.glanced[0]]
+        for column, cloud, weight in (
+            (5, region.context, None),
+            (4, None if goal is None else goal.cloud, None if goal is None else goal.weight),
+        ):
+            if cloud is not None:
+                few = farthest_points(cloud.points, others)
+                parts.append(cloud.select(few))
+                rows = np.zeros((len(few), 6))
+                rows[:, column] = 1.0 if weight is None else weight[few]
+                weights.append(rows)
+                looks.append(np.arange(len(few)) < config.glanced[1])
+        self.cloud, self.weights = concatenate(parts), np.concatenate(weights)
         self.hue = shades(self.cloud.colors)
-        self.spread = np.concatenate([region.spreads[chosen], np.full(len(few), OFFSET)])
-        self.weights = self._weights(region, chosen, len(few), p_goal, payload)
+        self.spread = np.full(len(self.cloud), OFFSET)
+        self.spread[: len(chosen)] = region.spreads[chosen]
         self.size, self.marks = len(chosen), float(self.hue[: len(chosen)].var(axis=0).sum())
-        glance = np.arange(len(self.cloud))
-        own, others = config.glanced
-        self.glance = glance[(glance < own) | (glance >= self.size) & (glance < self.size + others)]
+        self.glance = np.flatnonzero(np.concatenate(looks))
         self.whole, self.beside = Surface(region.whole, views), Surface(beside, views)
         self.p_goal = p_goal
-
-    @staticmethod
-    def _weights(
-        region: Region,
-        chosen: NDArray[np.int64],
-        context: int,
-        p_goal: FloatArray,
-        payload: PointCloud | None,
-    ) -> FloatArray:
-        """(M, 5) of the region, near the gripper, of what stays in place, of what is taken, of the context.
-
-        If all of the region is taken, or none, what is near the gripper stands for it.
-        """
-        weight = region.weight[chosen]
-        away = np.linalg.norm(region.cloud.points[chosen] - p_goal, axis=1)
-        near = weight * np.exp(-0.5 * ((away - away.min()) / NEXT) ** 2)
-        firm = weight * region.trust[chosen]
-        taken = np.zeros(len(chosen))
-        if payload is not None:
-            taken = weight * within(region.cloud.points[chosen], payload.points, SAME)
-        taken = taken if taken.any() else near
-        own = np.stack([weight, near, firm, taken, np.zeros(len(chosen))], axis=1)
-        others = np.tile([0.0, 0.0, 0.0, 0.0, 1.0], (context, 1))
-        return np.concatenate([own, others])
 
     def moved(self, T: FloatArray, which: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
         """Points (H * M, 3) and normals after each of motions (H, 4, 4), one after the other."""
@@ -106,24 +90,43 @@ class Template:
         return points, se3.rotate(T, self.cloud.normals[which]).reshape(-1, 3)
 
 
-def glance(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
-    """(H, 5) quick looks at motions (H, 4, 4).
+def _weights(
+    region: Region, chosen: NDArray[np.int64], p_goal: FloatArray, payload: PointCloud | None, at_goal: bool
+) -> FloatArray:
+    """(M, 6) `Template.weights` of points of the region.
 
-    At the region in its colours, its shape, what is near, what is firm, and what is taken.
+    If all of the region is taken, or none, what is near the gripper stands for it; so it does for the goal,
+    if the region is `at_goal`.
+    """
+    weight = region.weight[chosen]
+    near = weight * fading(np.linalg.norm(region.cloud.points[chosen] - p_goal, axis=1))
+    firm = weight * region.trust[chosen]
+    taken = np.zeros(len(chosen))
+    if payload is not None:
+        taken = weight * within(region.cloud.points[chosen], payload.points, SAME)
+    taken = taken if taken.any() else near
+    return np.stack([weight, near, firm, taken, near * at_goal, np.zeros(len(chosen))], axis=1)
+
+
+def glance(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
+    """(H, 6) quick looks at motions (H, 4, 4).
+
+    At the region in its colours, its shape, what is near, what is firm, what is taken, and the goal.
     """
     which = template.glance
     found = surface.explain(*template.moved(T, which), *_tiled(template, which, len(T)))
     loose, color = found.loose.reshape(len(T), -1), found.color.reshape(len(T), -1)
     w = template.weights[which]
-    values = (loose * color, loose, loose * np.sqrt(color), loose, loose * np.sqrt(color))
-    columns = (w[:, 0], *w[:, :4].T)
+    tinted = loose * np.sqrt(color)
+    values = (loose * color, loose, tinted, loose, tinted, tinted)
+    columns = (w[:, 0], *w[:, :5].T)
     return np.stack(
         [(v * c).sum(1) / max(c.sum(), 1e-9) for v, c in zip(values, columns, strict=True)], axis=1
     )
 
 
 def shares(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
-    """(H, 34) what `networks.verification.EVIDENCE` names first: forward, context, backward, around."""
+    """(H, 40) what `networks.verification.EVIDENCE` names first: forward, context, backward, around."""
     H, which = len(T), np.arange(len(template.cloud))
     points, normals = template.moved(T, which)
     found = surface.explain(points, normals, *_tiled(template, which, H))
@@ -131,10 +134,10 @@ def shares(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
     hidden, absent = _missing(surface, points, normals, found.loose)
     hidden, absent = hidden.reshape(H, -1), absent.reshape(H, -1)
     columns = []
-    for w in template.weights[:, :4].T:
+    for w in template.weights[:, :5].T:
         visible = np.maximum((1 - hidden * (1 - loose)) @ w, 1e-9)
         columns += [exact @ w / visible, loose @ w / visible, *_rest(loose, color, hidden, absent, w)]
-    w = template.weights[:, 4]
+    w = template.weights[:, 5]
     all_of_it = max(w.sum(), 1e-9)
     columns += [loose @ w / all_of_it, (loose * color) @ w / np.maximum(loose @ w, 1e-9)]
     columns += [(absent * (1 - loose)) @ w / all_of_it]
@@ -215,7 +218,7 @@ def _backward(template: Template, surface: Surface, T: FloatArray) -> FloatArray
     at = se3.apply(T, template.p_goal[None])[0]
     inside = np.asarray(surface.tree.query_ball_point(at, BESIDE, return_sorted=True), dtype=np.int64)
     there = _explain(beside, surface, _some(inside, template.backward), back).loose
-    return np.array([got / all_of_it, color, clash, np.log1p(len(near)) / 5, forward.mean(), _mean(there)])
+    return np.array([got / all_of_it, color, clash, np.log1p(len(near)), forward.mean(), _mean(there)])
 
 
 def _some(index: NDArray[np.int64], count: int) -> NDArray[np.int64]:

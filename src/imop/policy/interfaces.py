@@ -43,6 +43,7 @@ class PolicyConfig:
         lets_go: share of what is held in the region of a step that lets go from which nothing else is in it.
         scrap, farther: a region of fewer points is not believed if it is farther from where the gripper goes
             than something else is, by so many metres.
+        goal: what stands farther from where the gripper goes is no goal, metres.
         connected: what is connected to the region, this near to it (metres), is its context.
         borrowed: what hangs in the air or is too small is taken with what lies this near to it, metres.
         standing: lowest point of something that stands on the ground, metres.
@@ -75,6 +76,7 @@ class PolicyConfig:
     lets_go: float = 0.8
     scrap: int = 100
     farther: float = 0.05
+    goal: float = 0.15
     connected: float = 0.1
     borrowed: tuple[float, ...] = (0.04, 0.08, 0.16, 0.3)
     standing: float = 0.04

@@ -13,6 +13,7 @@
 | `half_turn` | half a turn after what was found |
 | `straight` | what was found, turned as the gripper was in the demonstration |
 | `exact` | what was found, laid exactly onto what was seen |
+| `goal` | every turn on every thing, for what stands where the hand goes |
 | `part`, `payload` | the same as `matches` for what is next to the gripper, and for what it takes next |
 """
 

@@ -21,6 +21,8 @@ from imop.policy.contacts import SAME, Contacts, find_contacts, leaving
 from imop.policy.interfaces import PolicyConfig, Transition
 from imop.types import BoolArray, FloatArray
 
+# What is next to the gripper: scale of the weights, metres.
+NEXT = 0.05
 # What is taken for the spread of points of which nothing is known, metres.
 UNKNOWN = 0.01
 
@@ -67,6 +69,26 @@ class Region:
         anchor = points[nearest(p[None], points)[1][0, 0]]
         near = np.linalg.norm(points - anchor, axis=1) < reach
         return Region(self.cloud.select(near), self.weight[near], self.p_gripper_held)
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """What stands where a step takes the gripper, and stays there: a region that needs no network.
+
+    Attributes:
+        cloud: its points in the demonstrated scene, with normals.
+        weight: (N,) in (0, 1], larger near the gripper.
+        thing: (M, 3) points of the things that it is part of.
+    """
+
+    cloud: PointCloud
+    weight: FloatArray
+    thing: FloatArray
+
+
+def fading(away: FloatArray) -> FloatArray:
+    """(N,) in (0, 1], weights of points by their distance (N,) from the gripper, metres."""
+    return np.asarray(np.exp(-0.5 * ((away - away.min()) / NEXT) ** 2))
 
 
 def find_regions(steps: Sequence[Transition], config: PolicyConfig) -> list[Region]:

@@ -11,8 +11,8 @@ from imop.geometry.icp import SMALLEST, upright
 from imop.policy.evidence import Template
 from imop.policy.interfaces import BEGINNING, Candidate, Feasible, PolicyConfig, Progress, Scene, Transition
 from imop.policy.proposals import Asked, equal_turns, half_turn, straightened, upright_motions
-from imop.policy.region import Region
-from imop.policy.target import BESIDE, Target, around, middle, thing_of, without_held
+from imop.policy.region import Goal, Region
+from imop.policy.target import BESIDE, Target, around, find_goal, middle, thing_of, without_held
 from imop.policy.verification import Part, Pool, Sought, Verifier
 from imop.types import FloatArray
 
@@ -41,18 +41,15 @@ class StepSearch:
         before, T_goal = step.before, step.action.T_world_gripper
         views = tuple(before.observation.views.values())
         standing = before.cloud.select(~before.ground.bare)
-        template = Template(
-            region, T_goal[:3, 3], _beside(standing, T_goal, region, config), views, config, payload
-        )
-        parts = _parts(region, payload, T_goal[:3, 3], config)
+        beside, goal = _beside(standing, T_goal, region, config), find_goal(step, region, config)
+        template = Template(region, T_goal[:3, 3], beside, views, config, payload, goal)
+        parts = _parts(region, payload, goal, T_goal[:3, 3], config)
         turns = equal_turns(region.cloud)
         self.sought, self._ask = Sought(config, step, region, template, parts, turns, verifier), ask
-        self._middles = [middle(region.cloud.points)]
-        if region.context is not None:
-            self._middles.append(middle(region.whole.points))
         self._half_turn = half_turn(thing_of(parts[0].coarse, standing.points))
         # What is around the goal is evidence, too.
-        self._concerned = np.concatenate([region.whole.points, T_goal[None, :3, 3]])
+        around_goal = np.zeros((0, 3)) if goal is None else goal.cloud.points
+        self._concerned = np.concatenate([region.whole.points, around_goal, T_goal[None, :3, 3]])
 
     def locate(
         self, query: Scene, progress: Progress = BEGINNING, feasible: Feasible | None = None
@@ -125,8 +122,7 @@ class StepSearch:
         for part in self.sought.parts:
             matches = pool.asked.matches.of(part.fine)
             if part.name != "firm":
-                middles = self._middles if part.name == "region" else [middle(part.fine)]
-                upright_on = matches.upright(pool.target, config.places, config.turns, middles)
+                upright_on = matches.upright(pool.target, config.places, config.turns, part.middles)
                 seeds = [matches.motions(config.samples), upright_on]
                 pool.search(part, np.concatenate(seeds))
         self._turned(pool)
@@ -138,8 +134,8 @@ class StepSearch:
         if len(places):
             for part in self.sought.parts:
                 if part.name != "firm":
-                    seeds = upright_motions(middle(part.fine), places, config.turns)
-                    pool.search(part, seeds, "anywhere")
+                    seeds = upright_motions(part.middles[0], places, config.turns)
+                    pool.search(part, seeds, "goal" if part.name == "goal" else "anywhere")
             self._turned(pool)
 
     def _turned(self, pool: Pool) -> None:
@@ -161,26 +157,38 @@ class StepSearch:
 
 
 def _parts(
-    region: Region, payload: PointCloud | None, p_goal: FloatArray, config: PolicyConfig
+    region: Region,
+    payload: PointCloud | None,
+    goal: Goal | None,
+    p_goal: FloatArray,
+    config: PolicyConfig,
 ) -> tuple[Part, ...]:
-    """The region itself, what of it stays in place, what is next to the gripper, and what it takes."""
+    """The region, what of it stays in place, what is next to the gripper, what it takes, where it goes."""
     points = region.cloud.points
+    middles = (middle(points),) if region.context is None else (middle(points), middle(region.whole.points))
     coarse, fine = config.laid
     rng = np.random.default_rng(0)
     share = region.trust / region.trust.sum()
     drawn = rng.choice(len(points), min(fine, 4 * len(points)), p=share)
-    parts = [_part("region", 0, points, config), Part("firm", 3, points[drawn[:coarse]], points[drawn])]
+    parts = [
+        _part("region", 0, points, middles, config),
+        Part("firm", 3, points[drawn[:coarse]], points[drawn], middles),
+    ]
     near = region.next_to(p_goal, config.next_to).cloud.points
     if SMALLEST <= len(near) < config.alone * len(points):
-        parts.append(_part("part", 2, near, config))
+        parts.append(_part("part", 2, near, (middle(near),), config))
     if payload is not None:
-        parts.append(_part("payload", 4, payload.points, config))
+        parts.append(_part("payload", 4, payload.points, (middle(payload.points),), config))
+    if goal is not None:
+        parts.append(_part("goal", 5, goal.cloud.points, (middle(goal.thing),), config))
     return tuple(parts)
 
 
-def _part(name: str, column: int, points: FloatArray, config: PolicyConfig) -> Part:
+def _part(
+    name: str, column: int, points: FloatArray, middles: tuple[FloatArray, ...], config: PolicyConfig
+) -> Part:
     coarse, fine = (points[farthest_points(points, count)] for count in config.laid)
-    return Part(name, column, coarse, fine)
+    return Part(name, column, coarse, fine, middles)
 
 
 def _beside(standing: PointCloud, T_goal: FloatArray, region: Region, config: PolicyConfig) -> PointCloud:

@@ -15,8 +15,8 @@ from imop.geometry.icp import Refiner
 from imop.geometry.neighbours import nearest, within
 from imop.geometry.perception import viewpoints
 from imop.policy.contacts import SAME
-from imop.policy.interfaces import Scene
-from imop.policy.region import Region
+from imop.policy.interfaces import PolicyConfig, Scene, Transition
+from imop.policy.region import NEXT, Goal, Region, fading
 from imop.types import BoolArray, CameraView, Float32Array, FloatArray
 
 # Farthest counterpart, metres.
@@ -164,6 +164,30 @@ def thing_of(points: FloatArray, standing: FloatArray) -> FloatArray:
     part_of = labels[nearest(points, standing)[1][:, 0]]
     thing: FloatArray = standing[labels == np.bincount(part_of).argmax()]
     return thing
+
+
+def find_goal(step: Transition, region: Region, config: PolicyConfig) -> Goal | None:
+    """What stands next to the action and was not taken or pushed away by it; None if there is nothing.
+
+    None, too, if it is the region.
+    """
+    still, later = (scene.cloud.select(~scene.ground.bare) for scene in (step.before, step.after))
+    if not len(still):
+        return None
+    assert still.normals is not None
+    gone = Surface(still, tuple(step.after.observation.views.values())).seen(still.points, still.normals)[1]
+    if len(later):
+        gone &= ~within(still.points, later.points, SAME)
+    still = still.select(~gone)
+    away = np.linalg.norm(still.points - step.action.T_world_gripper[:3, 3], axis=1)
+    near = away < away.min(initial=np.inf) + 2 * NEXT
+    apart = near & ~within(still.points, region.cloud.points, SAME)
+    known = apart.sum() < (1 - config.alone) * near.sum()
+    if known or near.sum() < config.fewest or away.min() > config.goal:
+        return None
+    labels = connected(still.points)
+    thing = still.points[np.isin(labels, labels[near])]
+    return Goal(still.select(near), fading(away[near]), thing)
 
 
 def without_held(cloud: PointCloud, query: Scene, region: Region) -> PointCloud:

@@ -69,12 +69,14 @@ class Part:
         name: of the generator.
         column: of `evidence.glance` that its seeds are chosen by.
         coarse, fine: (K, 3) points that are laid onto the scene, first and last.
+        middles: points (3,) of it that may come to the middle of a thing.
     """
 
     name: str
     column: int
     coarse: FloatArray
     fine: FloatArray
+    middles: tuple[FloatArray, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,7 +241,8 @@ class Pool:
             return np.zeros((len(T), 5))
         sought, m = self._sought, self.asked.matches
         config, turns = sought.config, sought.turns
-        near = m.of(sought.parts[2].fine) if len(sought.parts) > 2 else m
+        close = [part for part in sought.parts if part.name in ("part", "payload")]
+        near = m.of(close[0].fine) if close else m
         turned = (T[:, None] @ turns).reshape(-1, 4, 4)
 
         def of(matches: Matches, tolerance: float) -> FloatArray:
@@ -253,7 +256,7 @@ class Pool:
         """(H, 7) tilt, rise, and how far the gripper goes from where hint and repetition take it."""
         T_goal, center = self._sought.T_goal, self._sought.center
         tilt = np.arccos(np.clip(T[:, 2, 2], -1.0, 1.0))
-        rise = 10 * (se3.apply(T, center[None])[:, 0, 2] - center[2])
+        rise = se3.apply(T, center[None])[:, 0, 2] - center[2]
         columns = [tilt, rise, np.full(len(T), float(self.T_last is not None))]
         for known in (self.T_last, self.T_repeated):
             goals = T @ T_goal
@@ -263,7 +266,7 @@ class Pool:
         return np.stack(columns, axis=1)
 
     def _situation(self, count: int) -> FloatArray:
-        """(count, 11) what is the same for all candidates: the hand, and what kind of region it is."""
+        """(count, 12) what is the same for all candidates: the hand, and what kind of region it is."""
         sought, step = self._sought, self._sought.step
         region, spread, w = sought.region, sought.template.spread, sought.template.weights
         size = np.ptp(region.cloud.points, axis=0).max()
@@ -272,12 +275,13 @@ class Pool:
             float(len(region.p_gripper_held) > 0),
             float(step.action.gripper_open),
             opening - step.before.observation.gripper_opening,
-            10 * size,
-            np.log1p(len(region.cloud)) / 5,
+            size,
+            np.log1p(len(region.cloud)),
             region.weight.mean(),
-            *(100 * np.average(spread, weights=w[:, k] + 1e-9) for k in (0, 1)),
+            *(np.log(np.average(spread, weights=w[:, k] + 1e-9)) for k in (0, 1)),
             np.log(len(sought.turns)),
             sought.template.marks,
             self._palette,
+            float(any(part.name == "goal" for part in sought.parts)),
         ]
         return np.tile(np.array(values, dtype=np.float64), (count, 1))
