@@ -5,7 +5,7 @@ observed around it, which tells a thing from a larger one and a front with handl
 decided here: `networks/verification.py` learns what the numbers are worth.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,19 +61,14 @@ class Template:
     ) -> None:
         own, others, self.backward = config.compared
         chosen = farthest_points(region.cloud.points, own)
+        parts = [region.cloud.select(chosen)]
         weights = [_weights(region, chosen, p_goal, payload, goal is None)]
-        parts, looks = [region.cloud.select(chosen)], [np.arange(len(chosen)) < config.glanced[0]]
-        for column, cloud, weight in (
-            (5, region.context, None),
-            (4, None if goal is None else goal.cloud, None if goal is None else goal.weight),
-        ):
-            if cloud is not None:
-                few = farthest_points(cloud.points, others)
-                parts.append(cloud.select(few))
-                rows = np.zeros((len(few), 6))
-                rows[:, column] = 1.0 if weight is None else weight[few]
-                weights.append(rows)
-                looks.append(np.arange(len(few)) < config.glanced[1])
+        looks = [np.arange(len(chosen)) < config.glanced[0]]
+        for column, cloud, weight in _beyond(region, goal):
+            few = farthest_points(cloud.points, others)
+            parts.append(cloud.select(few))
+            weights.append(weight[few, None] * np.eye(6)[column])
+            looks.append(np.arange(len(few)) < config.glanced[1])
         self.cloud, self.weights = concatenate(parts), np.concatenate(weights)
         self.hue = shades(self.cloud.colors)
         self.spread = np.full(len(self.cloud), OFFSET)
@@ -88,6 +83,14 @@ class Template:
         assert self.cloud.normals is not None
         points = se3.apply(T, self.cloud.points[which]).reshape(-1, 3)
         return points, se3.rotate(T, self.cloud.normals[which]).reshape(-1, 3)
+
+
+def _beyond(region: Region, goal: Goal | None) -> Iterator[tuple[int, PointCloud, FloatArray]]:
+    """What is not of the region and compared all the same: column and cloud, with weights (N,)."""
+    if region.context is not None:
+        yield 5, region.context, np.ones(len(region.context))
+    if goal is not None:
+        yield 4, goal.cloud, goal.weight
 
 
 def _weights(
