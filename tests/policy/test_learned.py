@@ -80,7 +80,6 @@ def chain(side):
     return links, above(*xy[0], TABLE + 0.01) @ se3.make(se3.euler(z=-heading[0]))
 
 
-@NOT_YET
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_what_bent_is_found_by_the_end_that_is_grasped(matcher, side):
     links, grasp = chain(side)

@@ -76,7 +76,8 @@ class VerificationNetwork(nn.Module):
         )
 
     def forward(self, evidence: Tensor) -> Tensor:
-        """Logits (H,) of candidates with evidence (H, INPUTS)."""
+        """Logits (H,) of candidates with evidence (H, INPUTS); NaN where nothing is known."""
+        evidence = torch.where(evidence.isnan(), self.standardized.mean, evidence)
         logits: Tensor = self.layers(self.standardized(evidence))[:, 0]
         return logits
 

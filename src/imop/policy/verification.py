@@ -253,7 +253,11 @@ class Pool:
         return np.stack(columns, axis=1)
 
     def _poses(self, T: FloatArray) -> FloatArray:
-        """(H, 7) tilt, rise, and how far the gripper goes from where hint and repetition take it."""
+        """(H, 7) tilt, rise, and how far the gripper goes from where hint and repetition take it.
+
+        At the beginning the hand stands where it stood in the demonstration, whatever lies where; to repeat
+        its motion means nothing then, so this is NaN.
+        """
         T_goal, center = self._sought.T_goal, self._sought.center
         tilt = np.arccos(np.clip(T[:, 2, 2], -1.0, 1.0))
         rise = se3.apply(T, center[None])[:, 0, 2] - center[2]
@@ -263,6 +267,8 @@ class Pool:
             other = goals if known is None else known @ T_goal
             away, turn = se3.translation_distance(goals, other), se3.rotation_distance(goals, other)
             columns += [np.log1p(away / 0.01), turn]
+        if self.T_last is None and se3.near(self.T_repeated, np.eye(4), *self._sought.config.same_motion):
+            columns[-2:] = np.full((2, len(T)), np.nan)
         return np.stack(columns, axis=1)
 
     def _situation(self, count: int) -> FloatArray:
