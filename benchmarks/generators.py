@@ -58,6 +58,7 @@ GENERATORS = (
     "exact",
     "part",
     "payload",
+    "goal",
 )
 """Of `policy/proposals.py`."""
 CONFIGURATIONS = ("", *GENERATORS)

@@ -34,7 +34,7 @@ def some(rng, cases=60):
 def test_what_decides_is_learned(tmp_path):
     torch.manual_seed(0)
     network = VerificationNetwork(VerificationConfig(width=16))
-    reached = fit(network, some(np.random.default_rng(0), 300), VerificationTraining((), tmp_path, steps=400))
+    reached = fit(network, some(np.random.default_rng(0), 900), VerificationTraining((), tmp_path, steps=400))
     assert reached["right"] > 0.65 * reached["possible"] > 0.5
     assert reached["calibration"] < 0.35 and abs(reached["sure"] - reached["right"]) < 0.25
 
