@@ -42,10 +42,10 @@ from imop.policy.interfaces import BEGINNING, Candidate, Matcher, Progress, Scen
 from imop.policy.learned import LearnedMatcher
 from imop.policy.registration import RegistrationMatcher
 from imop.training.families import HELD_OUT, TRAINING
-from imop.training.instances import shares
+from imop.training.plans import check_kinds
 from imop.training.set_up import SetUp
-from imop.training.synthetic import SAME_ONLY, synthetic_scenes
-from imop.training.takes import Example, executions, right_poses
+from imop.training.synthetic import SAME_ONLY, synthetic_executions
+from imop.training.takes import Example, right_poses
 from imop.types import FloatArray, Observation
 
 PER_JOB = 10
@@ -123,19 +123,15 @@ def make_matcher(method: str, weights: Path) -> Matcher:
 
 
 def drawn(options: Options, number: int) -> Iterator[tuple[list[Example], Observation | None]]:
-    """Executions without end, each with how one with other things begins, as soon as there was one."""
+    """The executions of one job, without end; see `synthetic_executions`."""
     content = int(np.random.SeedSequence([options.seed, number]).generate_state(1)[0])
-    rng = np.random.default_rng((content, 9))
     families = HELD_OUT if options.families == "held_out" else TRAINING
-    kinds = tuple(filter(None, options.kinds.split(",")))
-    wanted = shares(options.mix)
-    streams = {v: synthetic_scenes(families, v, content, kinds) for v in wanted}
-    elsewhere: Observation | None = None
-    while True:
-        groups = executions(next(streams[rng.choice(list(streams), p=list(wanted.values()))]))
-        for group in groups:
-            yield group, elsewhere
-        elsewhere = groups[0][0].asked.observations[0]
+    rng = np.random.default_rng((content, 9))
+    return synthetic_executions(families, options.mix, content, rng, kinds_of(options))
+
+
+def kinds_of(options: Options) -> list[str]:
+    return list(filter(None, options.kinds.split(",")))
 
 
 def job(options: Options, number: int) -> list[Row]:
@@ -143,9 +139,10 @@ def job(options: Options, number: int) -> list[Row]:
     torch.set_num_threads(1)
     rows: list[Row] = []
     steps = 0
+    matchers = {method: make_matcher(method, options.weights) for method in options.methods.split(",")}
     for i, (group, elsewhere) in enumerate(drawn(options, number)):
-        for method in options.methods.split(","):
-            rows += predict(method, options, f"{number}-{i}", group, elsewhere)
+        for method, matcher in matchers.items():
+            rows += predict(method, matcher, f"{number}-{i}", group, elsewhere if options.absent else None)
         steps += len(group)
         if steps >= PER_JOB:
             break
@@ -153,12 +150,12 @@ def job(options: Options, number: int) -> list[Row]:
 
 
 def predict(
-    method: str, options: Options, scene: str, group: Sequence[Example], elsewhere: Observation | None
+    method: str, matcher: Matcher, scene: str, group: Sequence[Example], elsewhere: Observation | None
 ) -> Iterator[Row]:
-    """The rows of one method for one demonstration and one query."""
+    """The rows of one method for one demonstration and one query, and where its things are not, if given."""
     set_up, progress = SetUp(), BEGINNING
     shown = set_up.transitions(group[0].shown)
-    prepared = make_matcher(method, options.weights).prepare(shown)
+    prepared = matcher.prepare(shown)
     for example in group:
         k = example.step
         started = time.perf_counter()
@@ -167,7 +164,7 @@ def predict(
         progress = Progress(found[0].T_query_support) if found else BEGINNING
         overlap = iou(shown[k].before, prepared[k].region, example)
         yield Row(method, scene, k, *off(found, example), overlap, sure(found), seconds)
-    if options.absent and elsewhere is not None:
+    if elsewhere is not None:
         started = time.perf_counter()
         found = prepared[0].locate(set_up.see(elsewhere))
         seconds = time.perf_counter() - started
@@ -238,6 +235,7 @@ def measure(options: Options) -> dict[str, list[Row]]:
     Raises:
         InvalidInput: for shares or kinds that there are not.
     """
+    check_kinds(kinds_of(options))
     rows: dict[str, list[Row]] = {method: [] for method in options.methods.split(",")}
     first = next(iter(rows.values()))
     numbers = count()

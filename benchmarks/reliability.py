@@ -6,7 +6,7 @@ Reads reports of benchmarks/held_out.py and benchmarks/open_loop.py. An answer i
 degrees. The threshold is as high as it may be to refuse at most 5 % of the right first actions of episodes,
 where nothing is known yet of what was done before. A step without an answer has no confidence; such steps are
 only counted. Where the thing shown is not in the scene (held_out.py --absent), every answer is a wrong first
-action, none is a refusal, and both count nowhere else.
+action. No answer counts as refused there. Neither counts anywhere else.
 """
 
 import json

@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.held_out import Options, Row, drawn, measure, off, predict, summary
+from benchmarks.held_out import Options, Row, drawn, make_matcher, measure, off, predict, summary
 from joblib import parallel_config
 
 from benchmarks import held_out
+from imop.errors import InvalidInput
+from imop.networks.model import BUNDLED
 from imop.policy.interfaces import Candidate
 from imop.training.takes import right_poses
 
@@ -50,9 +52,14 @@ def test_rows_do_not_depend_on_the_number_of_processes(monkeypatch):
 
 
 def test_a_method_answers_every_step_and_is_asked_where_nothing_is(group):
-    options = Options(families="training", absent=True)
+    matcher = make_matcher("registration", BUNDLED)
     elsewhere = group[0].shown.observations[-1]
-    *rows, absent = predict("registration", options, "0-0", group, elsewhere)
+    *rows, absent = predict("registration", matcher, "0-0", group, elsewhere)
     assert [row.step for row in rows] == [example.step for example in group]
     assert absent.absent and absent.position is None and 0 <= absent.confidence <= 1
     assert all(np.isfinite(row.position) and 0 <= row.region_iou <= 1 for row in rows)
+
+
+def test_a_kind_that_there_is_not_is_refused_and_the_accepted_ones_named():
+    with pytest.raises(InvalidInput, match=r"kinds.*juggle.*unpack"):
+        measure(Options(families="training", kinds="keep,juggle"))

@@ -92,22 +92,27 @@ class Surface:
         return Explained(exact, loose, np.where(found, color, 0.0), index)
 
     def seen(self, points: FloatArray, normals: FloatArray) -> tuple[BoolArray, BoolArray]:
-        """(K,) True where no view can say that a face at the point, with its normal, is not there.
+        """What its views say of faces at points (K, 3); see the function `seen`."""
+        return seen(self._views, points, normals)
 
-        A view can if the face lies in its image and turns to it, and nothing nearer stands before it. And
-        (K,) True where a view sees through the point to what is farther away.
-        """
-        hidden, through = np.ones(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
-        for view in self._views:
-            to_camera = view.T_world_camera[:3, 3] - points
-            distance = np.maximum(np.linalg.norm(to_camera, axis=1), 1e-9)
-            slant = np.einsum("mk,mk->m", to_camera, normals) / distance
-            (column, row), z, inside = (part.T for part in project(view, points))
-            depth = view.depth[row, column]
-            beyond = np.where(inside & np.isfinite(depth), depth - z, -np.inf)
-            hidden &= ~((beyond > -THROUGH) & (slant > GRAZING))
-            through |= beyond > THROUGH
-        return hidden, through
+
+def seen(views: Sequence[CameraView], points: FloatArray, normals: FloatArray) -> tuple[BoolArray, BoolArray]:
+    """(K,) True where no view can say that a face at the point, with its normal, is not there.
+
+    A view can if the face lies in its image and turns to it, and nothing nearer stands before it. And
+    (K,) True where a view sees through the point to what is farther away.
+    """
+    hidden, through = np.ones(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
+    for view in views:
+        to_camera = view.T_world_camera[:3, 3] - points
+        distance = np.maximum(np.linalg.norm(to_camera, axis=1), 1e-9)
+        slant = np.einsum("mk,mk->m", to_camera, normals) / distance
+        (column, row), z, inside = (part.T for part in project(view, points))
+        depth = view.depth[row, column]
+        beyond = np.where(inside & np.isfinite(depth), depth - z, -np.inf)
+        hidden &= ~((beyond > -THROUGH) & (slant > GRAZING))
+        through |= beyond > THROUGH
+    return hidden, through
 
 
 def shades(colors: Float32Array) -> FloatArray:
@@ -175,7 +180,7 @@ def find_goal(step: Transition, region: Region, config: PolicyConfig) -> Goal | 
     if not len(still):
         return None
     assert still.normals is not None
-    gone = Surface(still, tuple(step.after.observation.views.values())).seen(still.points, still.normals)[1]
+    _, gone = seen(tuple(step.after.observation.views.values()), still.points, still.normals)
     if len(later):
         gone &= ~within(still.points, later.points, SAME)
     still = still.select(~gone)

@@ -27,10 +27,9 @@ from imop.policy.registration import RegistrationMatcher
 from imop.policy.verification import Pool, beside_rivals
 from imop.training.families import TRAINING
 from imop.training.families.thing import Family
-from imop.training.instances import shares
 from imop.training.set_up import SetUp
-from imop.training.synthetic import synthetic_scenes
-from imop.training.takes import Example, executions, right_poses
+from imop.training.synthetic import synthetic_executions
+from imop.training.takes import Example, right_poses
 from imop.types import BoolArray, Float32Array, FloatArray, Observation
 
 # Share of the later steps that are asked as the first of an episode, too.
@@ -70,17 +69,13 @@ def make_cases(
     rng = np.random.default_rng((seed, 7))
     found: list[list[tuple[Float32Array, BoolArray]]] = []
     matchers = LearnedMatcher(model), RegistrationMatcher(model.verification)
-    streams = {v: synthetic_scenes(families, v, seed) for v in shares(mix)}
-    elsewhere: Observation | None = None
-    while len(found) < count:
-        variation = rng.choice(list(streams), p=list(shares(mix).values()))
-        groups = executions(next(streams[variation]))
-        for group in groups:
-            matcher = matchers[int(rng.random() < REGISTERED)]
-            set_up = SetUp.misplaced(group[0].shown, rng) if rng.random() < MISPLACED else SetUp()
-            without = elsewhere if rng.random() < ABSENT else None
-            found += _cases(group, matcher, set_up, rng, without)
-        elsewhere = groups[0][0].asked.observations[0] if groups else elsewhere
+    for group, elsewhere in synthetic_executions(families, mix, seed, rng):
+        if len(found) >= count:
+            break
+        matcher = matchers[int(rng.random() < REGISTERED)]
+        set_up = SetUp.misplaced(group[0].shown, rng) if rng.random() < MISPLACED else SetUp()
+        without = elsewhere if rng.random() < ABSENT else None
+        found += _cases(group, matcher, set_up, rng, without)
     return found[:count]
 
 

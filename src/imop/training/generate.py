@@ -10,7 +10,7 @@ from joblib import Parallel, delayed
 from imop.errors import CorruptData, InvalidInput
 from imop.training.families import HELD_OUT, TRAINING, Family
 from imop.training.instances import VARIATIONS, shares
-from imop.training.plans import SHARES
+from imop.training.plans import SHARES, check_kinds
 from imop.training.route_shards import RouteShard, write_routes
 from imop.training.routes import synthetic_routes
 from imop.training.shards import Shard, write_shard
@@ -48,8 +48,7 @@ def generate(
         InvalidInput: if there is no such family or kind, or the mix is not four shares.
     """
     families = chosen(names, held_out)
-    if unknown := sorted(set(kinds) - set(SHARES)):
-        raise InvalidInput("kinds", f"no {', '.join(unknown)}", ", ".join(SHARES))
+    check_kinds(kinds)
     shares(mix)
     out.mkdir(parents=True, exist_ok=True)
     full = ROUTE_SHARD if routes else SHARD

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from imop.errors import InvalidInput
 from imop.extras import extra
 from imop.training.families.redraw import redrawn
 from imop.training.families.thing import Family, Floor, Thing
@@ -147,6 +148,16 @@ SHARES = {
 """What is done, and how often. The last six are kinds of goals: what is held is kept at it; a thing lies
 anywhere in another one; it is pushed to something; put into a hole; one of several equal joints is moved; a
 thing has one right side."""
+
+
+def check_kinds(kinds: Sequence[str]) -> None:
+    """Refuse what is not done in any plan.
+
+    Raises:
+        InvalidInput: if there is no such kind.
+    """
+    if unknown := sorted(set(kinds) - set(SHARES)):
+        raise InvalidInput("kinds", f"no {', '.join(unknown)}", ", ".join(SHARES))
 
 
 def draw_plan(

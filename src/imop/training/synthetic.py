@@ -12,7 +12,8 @@ from imop.training.instances import VARIATIONS, Variation, shares
 from imop.training.pairs import StepPair
 from imop.training.scenes import draw_scene
 from imop.training.stage import Unreachable
-from imop.training.takes import Example, make_pair, take
+from imop.training.takes import Example, executions, make_pair, take
+from imop.types import Observation
 
 TAKES = 2
 """How often a scene's recipe is demonstrated; every two takes make pairs. New scenes teach more than new
@@ -80,6 +81,37 @@ def synthetic_scenes(
             yield made
         fruitless = 0 if made else fruitless + 1
     raise InvalidInput("mix", f"no pair of {variation} in {_PATIENCE} scenes", "more families, or less of it")
+
+
+def synthetic_executions(
+    families: Mapping[str, Family],
+    mix: Sequence[float],
+    seed: int,
+    rng: np.random.Generator,
+    kinds: Sequence[str] = (),
+) -> Iterator[tuple[list[Example], Observation | None]]:
+    """Executions of scenes of a mix, without end: the steps of each demonstration and query, in their order.
+
+    With each comes how an execution with other things begins, as soon as there was one.
+
+    Args:
+        families: of the things.
+        mix: as in `synthetic_pairs`.
+        seed: of the scenes.
+        rng: draws which variation comes next.
+        kinds: of what is done (`plans.SHARES`); none for all.
+
+    Raises:
+        InvalidInput: if the mix is not four shares, or the families cannot give a pair of it.
+    """
+    wanted = shares(mix)
+    streams = {variation: synthetic_scenes(families, variation, seed, kinds) for variation in wanted}
+    elsewhere: Observation | None = None
+    while True:
+        groups = executions(next(streams[rng.choice(list(streams), p=list(wanted.values()))]))
+        for group in groups:
+            yield group, elsewhere
+        elsewhere = groups[0][0].asked.observations[0]
 
 
 def _same(families: Mapping[str, Family], rng: np.random.Generator, kinds: Sequence[str]) -> list[Example]:
