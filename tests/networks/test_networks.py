@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -5,22 +7,23 @@ import torch
 from imop.geometry import se3
 from imop.networks.backbone import Backbone, BackboneConfig
 from imop.networks.blocks import relation
-from imop.networks.graph import POINT_FEATURES, Graph, Level, build_graph, collate, nearest_neighbours
+from imop.networks.graph import Graph, Level, build_graph, collate
 from imop.networks.matching import MatchingConfig, MatchingNetwork, dual_softmax, reposition
 from imop.networks.region import (
     FARTHEST,
-    GRIPPER_FEATURES,
     NEAREST,
     NOISE,
+    REGION_INPUTS,
     RegionConfig,
     RegionNetwork,
     RegionPrediction,
     StepBatch,
+    one_step,
 )
 from tests.networks.scenes import SMALL, tabletop
 
 TINY = BackboneConfig(widths=(16, 16, 16))
-REGION = RegionConfig(backbone=BackboneConfig(POINT_FEATURES + GRIPPER_FEATURES, widths=(16, 16, 16)))
+REGION = RegionConfig(backbone=BackboneConfig(REGION_INPUTS, widths=(16, 16, 16)))
 GOAL = se3.make(se3.euler(x=np.pi), (0.1, 0.05, 0.87))
 NOW = se3.make(se3.euler(x=np.pi), (0.2, 0.0, 1.2))
 
@@ -54,15 +57,9 @@ def turned(graph, T):
     return Graph(levels, graph.features, graph.size)
 
 
-def cross(a, b):
-    return torch.from_numpy(nearest_neighbours(a.points.numpy(), b.points.numpy(), 8))
-
-
 def step(before, after, T_goal=GOAL, T_now=NOW):
-    poses = [torch.from_numpy(T.copy()).float()[None] for T in (T_goal, T_now)]
-    return StepBatch(
-        before, after, *poses, torch.tensor([[1.0, 0.0]]), cross(before, after), cross(after, before)
-    )
+    poses = torch.from_numpy(np.stack([T_goal, T_now])).float()
+    return one_step(before, after, poses, torch.tensor([1.0, 0.0]), 8)
 
 
 def batch(steps):
@@ -78,6 +75,8 @@ def batch(steps):
         ),
         torch.cat([s.cross + int(shift[i]) for i, s in enumerate(steps)]),
         torch.cat([s.cross_back + int(back[i]) for i, s in enumerate(steps)]),
+        torch.cat([s.fate for s in steps]),
+        torch.cat([s.past for s in steps]),
     )
 
 
@@ -112,6 +111,22 @@ def test_region_does_not_change_when_the_whole_step_is_moved():
     there = network(step(turned(before, YAW), turned(after, YAW), YAW @ GOAL, YAW @ NOW)).stages
     for a, b in zip(here, there, strict=True):
         torch.testing.assert_close(a, b, atol=1e-4, rtol=1e-3)
+
+
+def test_what_is_held_goes_with_the_hand_and_the_rest_stays():
+    scene = tabletop()
+    held = scene.colors[:, 0] > 0.7
+    M = GOAL @ se3.invert(NOW)
+    carried = replace(scene, points=np.where(held[:, None], se3.apply(M, scene.points), scene.points))
+    before, after = build_graph(scene, SMALL), build_graph(carried, SMALL)
+    seen = step(before, after)
+    stayed, went = seen.fate[:, :2].mean(dim=1), seen.fate[:, 2:].mean(dim=1)
+    held = before.features[:, 0] > 0.2
+    assert went[held].median() > 0.6 > 0.3 > stayed[held].median()
+    assert stayed[~held].median() > 0.6
+    back = step(after, before, NOW, GOAL)
+    torch.testing.assert_close(back.past, seen.fate)
+    torch.testing.assert_close(back.fate, seen.past)
 
 
 def test_region_of_a_batch_is_that_of_its_steps():

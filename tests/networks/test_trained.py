@@ -9,9 +9,9 @@ import torch
 from imop.geometry import se3
 from imop.geometry.cloud import concatenate
 from imop.networks.backbone import BackboneConfig
-from imop.networks.graph import POINT_FEATURES, GraphConfig
+from imop.networks.graph import GraphConfig
 from imop.networks.matching import MatchingConfig, MatchingNetwork, reposition
-from imop.networks.region import GRIPPER_FEATURES, RegionConfig, RegionNetwork
+from imop.networks.region import REGION_INPUTS, RegionConfig, RegionNetwork
 from imop.training import losses
 from imop.training.augment import augment
 from imop.training.pairs import StepPair, collate_samples, make_sample
@@ -19,7 +19,7 @@ from tests.networks.scenes import box_surface, moved, tabletop
 from tests.networks.test_networks import GOAL, NOW, permuted, turned
 
 GRAPH = GraphConfig(max_points=200, grids=(0.05,))
-REGION = RegionConfig(BackboneConfig(POINT_FEATURES + GRIPPER_FEATURES, (16, 16), (1, 1)), stages=1)
+REGION = RegionConfig(BackboneConfig(REGION_INPUTS, (16, 16), (1, 1)), stages=1)
 MATCHING = MatchingConfig(BackboneConfig(widths=(16, 16), depths=(1, 1)), layers=2, max_region=60)
 SPACING = 0.017
 """Between neighbours above the table when these scenes are thinned to 200 points, metres."""

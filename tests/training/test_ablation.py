@@ -7,7 +7,7 @@ from imop.networks.backbone import BackboneConfig
 from imop.networks.graph import POINT_FEATURES, GraphConfig
 from imop.networks.matching import MatchingConfig
 from imop.networks.model import PAPER, SMALL, ModelConfig, load_model
-from imop.networks.region import GRIPPER_FEATURES, RegionConfig
+from imop.networks.region import REGION_INPUTS, RegionConfig
 from imop.networks.routing import INPUTS, RoutingConfig
 from imop.training.ablation import Ablation
 from imop.training.config import TrainConfig
@@ -23,7 +23,7 @@ def backbone(inputs=POINT_FEATURES):
 
 TINY = ModelConfig(
     GraphConfig(max_points=40, grids=()),
-    RegionConfig(backbone(POINT_FEATURES + GRIPPER_FEATURES), stages=1),
+    RegionConfig(backbone(REGION_INPUTS), stages=1),
     MatchingConfig(backbone(), layers=2, max_region=20, heads=2),
     RoutingConfig(backbone(INPUTS), width=16, layers=1, heads=2),
 )

@@ -15,10 +15,10 @@ from torch import Tensor, nn
 from imop.errors import CorruptData
 from imop.files import read, replaced
 from imop.networks.backbone import BackboneConfig
-from imop.networks.graph import POINT_FEATURES, GraphConfig
+from imop.networks.graph import GraphConfig
 from imop.networks.matching import MatchingConfig, MatchingNetwork
 from imop.networks.pose import PoseConfig, pose_network
-from imop.networks.region import GRIPPER_FEATURES, RegionConfig, RegionNetwork
+from imop.networks.region import REGION_INPUTS, RegionConfig, RegionNetwork
 from imop.networks.routing import INPUTS, RoutingConfig, RoutingNetwork
 from imop.networks.verification import VerificationConfig, VerificationNetwork
 
@@ -52,7 +52,7 @@ SMALL = ModelConfig()
 PAPER = ModelConfig(
     GraphConfig(voxel=0.005, plane_voxel=0.02, max_points=5000, grids=(0.015, 0.03), neighbours=16),
     RegionConfig(
-        BackboneConfig(POINT_FEATURES + GRIPPER_FEATURES, (256, 384, 512), (2, 4, 4), group_width=16),
+        BackboneConfig(REGION_INPUTS, (256, 384, 512), (2, 4, 4), group_width=16),
         stages=4,
     ),
     MatchingConfig(

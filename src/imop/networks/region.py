@@ -8,15 +8,23 @@ counterpart may be, seen from the action, if the thing is another one of its kin
 from dataclasses import dataclass, field
 from typing import TypeVar
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
+from imop.geometry import se3
+from imop.geometry.neighbours import nearest
 from imop.networks.backbone import Backbone, BackboneConfig, level_relations
 from imop.networks.blocks import MLP, GraphBlock, relation
 from imop.networks.graph import POINT_FEATURES, Graph, nearest_neighbours
 from imop.types import FloatArray
 
 GRIPPER_FEATURES = 16
+# Distances (metres) from a point to what is there in the other state, which tell "nothing has changed".
+_ALIKE = (0.012, 0.04)
+FATES = 2 * len(_ALIKE)
+"""What is told of each point about the other state: whether it stayed, and whether it went with the hand."""
+REGION_INPUTS = POINT_FEATURES + GRIPPER_FEATURES + FATES
 # Counterparts are expected within these distances, metres: the noise of the cameras, and what is no part.
 NEAREST, FARTHEST = 0.001, 0.05
 # What the cameras and the grid of the cloud leave open, metres.
@@ -33,9 +41,7 @@ class RegionConfig:
         low_dimensional: whether the gripper's state is among the inputs (the paper's ablation).
     """
 
-    backbone: BackboneConfig = field(
-        default_factory=lambda: BackboneConfig(inputs=POINT_FEATURES + GRIPPER_FEATURES)
-    )
+    backbone: BackboneConfig = field(default_factory=lambda: BackboneConfig(inputs=REGION_INPUTS))
     stages: int = 2
     low_dimensional: bool = True
 
@@ -52,6 +58,8 @@ class StepBatch:
         gripper: (B, 2) whether it is open in s_i, and after the action.
         cross: (M, K) for each point of `before`, its nearest points of `after`.
         cross_back: (M', K) for each point of `after`, its nearest of `before`.
+        fate: (M, FATES) what became of each point of `before`; see `fates`.
+        past: (M', FATES) where each point of `after` comes from.
     """
 
     before: Graph
@@ -61,6 +69,8 @@ class StepBatch:
     gripper: Tensor
     cross: Tensor
     cross_back: Tensor
+    fate: Tensor
+    past: Tensor
 
     @property
     def features(self) -> Tensor:
@@ -70,7 +80,8 @@ class StepBatch:
     def to(self, device: torch.device | str) -> "StepBatch":
         """The same batch on a device."""
         rest = (self.T_world_goal, self.T_world_now, self.gripper, self.cross, self.cross_back)
-        return StepBatch(self.before.to(device), self.after.to(device), *(t.to(device) for t in rest))
+        told = (self.fate, self.past)
+        return StepBatch(self.before.to(device), self.after.to(device), *(t.to(device) for t in rest + told))
 
 
 def cross_neighbours(before: Graph, after: Graph, k: int) -> tuple[Tensor, Tensor]:
@@ -78,6 +89,29 @@ def cross_neighbours(before: Graph, after: Graph, k: int) -> tuple[Tensor, Tenso
     p_before, p_after = (g.points.cpu().double().numpy() for g in (before, after))
     forth, back = nearest_neighbours(p_before, p_after, k), nearest_neighbours(p_after, p_before, k)
     return torch.from_numpy(forth), torch.from_numpy(back)
+
+
+def fates(before: Graph, after: Graph, poses: Tensor) -> tuple[Tensor, Tensor]:
+    """(M, FATES) of the points of s_i and (M', FATES) of those of s_i'; of single clouds.
+
+    Nearnesses, 0 to 1, of what the other state has where the point is, and of what it has where the hand's
+    motion takes the point. What is held or pushed goes with the hand, whatever the action is meant for.
+
+    Args:
+        before: s_i.
+        after: s_i'.
+        poses: (2, 4, 4) T_i and the gripper in s_i, world frame.
+    """
+    T_goal, T_now = poses.double().numpy()
+    M = T_goal @ se3.invert(T_now)
+    p_before, p_after = (g.points.double().numpy() for g in (before, after))
+
+    def told(points: FloatArray, others: FloatArray, motion: FloatArray) -> Tensor:
+        away = [nearest(p, others)[0] for p in (points, se3.apply(motion, points))]
+        columns = [np.exp(-distance / scale) for distance in away for scale in _ALIKE]
+        return torch.from_numpy(np.concatenate(columns, axis=1).astype(np.float32))
+
+    return told(p_before, p_after, M), told(p_after, p_before, se3.invert(M))
 
 
 def one_step(before: Graph, after: Graph, poses: Tensor, gripper: Tensor, neighbours: int) -> StepBatch:
@@ -90,8 +124,8 @@ def one_step(before: Graph, after: Graph, poses: Tensor, gripper: Tensor, neighb
         gripper: (2,) whether it is open in s_i, and after the action.
         neighbours: K of the cross attention.
     """
-    cross = cross_neighbours(before, after, neighbours)
-    return StepBatch(before, after, poses[:1], poses[1:], gripper[None], *cross)
+    cross, told = cross_neighbours(before, after, neighbours), fates(before, after, poses)
+    return StepBatch(before, after, poses[:1], poses[1:], gripper[None], *cross, *told)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,8 +185,8 @@ class RegionNetwork(nn.Module):
     def forward(self, steps: StepBatch) -> RegionPrediction:
         """Region and invariance of a batch of steps."""
         before, after = steps.before, steps.after
-        x = self.backbone(before, self._inputs(before, steps))
-        y = self.backbone(after, self._inputs(after, steps))
+        x = self.backbone(before, self._inputs(before, steps, steps.fate))
+        y = self.backbone(after, self._inputs(after, steps, steps.past))
         r_before, r_after = level_relations(before.levels[0]), level_relations(after.levels[0])
         r_cross = _cross_relations(before, after, steps.cross)
         r_back = _cross_relations(after, before, steps.cross_back)
@@ -169,8 +203,8 @@ class RegionNetwork(nn.Module):
         share = torch.sigmoid(self.spread(x)[:, 0].float())
         return RegionPrediction(logits, NEAREST * (FARTHEST / NEAREST) ** share)
 
-    def _inputs(self, graph: Graph, steps: StepBatch) -> Tensor:
-        gripper = gripper_features(graph, steps)
+    def _inputs(self, graph: Graph, steps: StepBatch, fate: Tensor) -> Tensor:
+        gripper = torch.cat([gripper_features(graph, steps), fate], dim=1)
         if not self.config.low_dimensional:
             gripper = torch.zeros_like(gripper)
         return torch.cat([graph.features, gripper], dim=1)

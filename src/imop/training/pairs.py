@@ -13,7 +13,7 @@ from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, farthest_points
 from imop.geometry.neighbours import nearest
 from imop.networks.graph import Graph, GraphConfig, build_graph, collate
-from imop.networks.region import StepBatch, cross_neighbours
+from imop.networks.region import StepBatch, cross_neighbours, fates
 from imop.types import BoolArray, FloatArray, as_array, as_pose
 
 # A region point and its counterpart in the query are at most this far apart after the true motion, metres.
@@ -77,6 +77,7 @@ class Sample:
         poses: (2, 4, 4) float32: T_i and the gripper in s_i.
         gripper: (2,) float32.
         cross, cross_back: nearest points between s_i and s_i'.
+        fate, past: what became of the points of s_i, and where those of s_i' come from.
         region: (M,) float32, 1 in the region, of the finest points of `before`.
         invariance: (M,) float32 metres, as in `StepPair`; NaN outside the region and where it is not known.
         chosen: (R,) int64, the points that are matched.
@@ -91,6 +92,8 @@ class Sample:
     gripper: Tensor
     cross: Tensor
     cross_back: Tensor
+    fate: Tensor
+    past: Tensor
     region: Tensor
     invariance: Tensor
     chosen: Tensor
@@ -151,16 +154,17 @@ def make_sample(
     if len(chosen) > max_region:
         chosen = np.sort(rng.choice(chosen, max_region, replace=False))
     far = np.zeros(len(stored)) if pair.invariance is None else pair.invariance[stored]
-    poses = np.stack([pair.T_world_goal, pair.T_world_now]).astype(np.float32)
+    poses = torch.from_numpy(np.stack([pair.T_world_goal, pair.T_world_now]).astype(np.float32))
     # What is known to have no counterpart near is matched to nothing, whatever else lies there.
     matched = label & ~(far > MATCH_RADIUS)
     return Sample(
         before,
         after,
         query,
-        torch.from_numpy(poses),
+        poses,
         torch.tensor(pair.gripper_open, dtype=torch.float32),
         *cross_neighbours(before, after, config.neighbours),
+        *fates(before, after, poses),
         torch.from_numpy(label.astype(np.float32)),
         torch.from_numpy(np.where(label, far, np.nan).astype(np.float32)),
         torch.from_numpy(chosen),
@@ -203,6 +207,8 @@ def collate_samples(samples: Sequence[Sample]) -> PairBatch:
         torch.stack([s.gripper for s in samples]),
         torch.cat([s.cross + start for s, start in zip(samples, first_after, strict=True)]),
         torch.cat([s.cross_back + start for s, start in zip(samples, first_before, strict=True)]),
+        torch.cat([s.fate for s in samples]),
+        torch.cat([s.past for s in samples]),
     )
     return PairBatch(
         step,
