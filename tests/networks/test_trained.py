@@ -164,6 +164,7 @@ def test_predictions_follow_the_order_of_the_points(networks):
         before=permuted(one.before, of_before),
         query=permuted(one.query, of_query),
         cross=one.cross[of_before],
+        fate=one.fate[of_before],
         cross_back=place[one.cross_back],
         region=one.region[of_before],
         chosen=place[one.chosen],
