@@ -120,7 +120,7 @@ def test_what_is_held_goes_with_the_hand_and_the_rest_stays():
     carried = replace(scene, points=np.where(held[:, None], se3.apply(M, scene.points), scene.points))
     before, after = build_graph(scene, SMALL), build_graph(carried, SMALL)
     seen = step(before, after)
-    stayed, went = seen.fate[:, :2].mean(dim=1), seen.fate[:, 2:].mean(dim=1)
+    stayed, went = seen.fate[:, :2].mean(dim=1), seen.fate[:, 2:4].mean(dim=1)
     held = before.features[:, 0] > 0.2
     assert went[held].median() > 0.6 > 0.3 > stayed[held].median()
     assert stayed[~held].median() > 0.6

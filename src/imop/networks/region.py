@@ -5,6 +5,7 @@ point-wise sigmoid over s_i after every stage. Beyond the paper it says of every
 counterpart may be, seen from the action, if the thing is another one of its kind: Definition 1's epsilon.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -17,13 +18,14 @@ from imop.geometry.neighbours import nearest
 from imop.networks.backbone import Backbone, BackboneConfig, level_relations
 from imop.networks.blocks import MLP, GraphBlock, relation
 from imop.networks.graph import POINT_FEATURES, Graph, nearest_neighbours
-from imop.types import FloatArray
+from imop.types import Float32Array, FloatArray
 
 GRIPPER_FEATURES = 16
 # Distances (metres) from a point to what is there in the other state, which tell "nothing has changed".
 _ALIKE = (0.012, 0.04)
-FATES = 2 * len(_ALIKE)
-"""What is told of each point about the other state: whether it stayed, and whether it went with the hand."""
+FATES = 4 * len(_ALIKE)
+"""What is told of each point: whether it stays and whether it goes with the hand, in the step and in the
+next transport."""
 REGION_INPUTS = POINT_FEATURES + GRIPPER_FEATURES + FATES
 # Counterparts are expected within these distances, metres: the noise of the cameras, and what is no part.
 NEAREST, FARTHEST = 0.001, 0.05
@@ -58,8 +60,8 @@ class StepBatch:
         gripper: (B, 2) whether it is open in s_i, and after the action.
         cross: (M, K) for each point of `before`, its nearest points of `after`.
         cross_back: (M', K) for each point of `after`, its nearest of `before`.
-        fate: (M, FATES) what became of each point of `before`; see `fates`.
-        past: (M', FATES) where each point of `after` comes from.
+        fate: (M, FATES) what becomes of each point of `before`; see `fates`.
+        past: (M', FATES) where each point of `after` comes from, and what becomes of it.
     """
 
     before: Graph
@@ -91,30 +93,69 @@ def cross_neighbours(before: Graph, after: Graph, k: int) -> tuple[Tensor, Tenso
     return torch.from_numpy(forth), torch.from_numpy(back)
 
 
-def fates(before: Graph, after: Graph, poses: Tensor) -> tuple[Tensor, Tensor]:
+@dataclass(frozen=True, eq=False)
+class Transport:
+    """A later motion of the closed hand, which shows what an action before it is about to take.
+
+    Attributes:
+        p_after: (K, 3) points of the state that it led to, metres.
+        T_moved: (4, 4) how the hand moved, world frame: its pose at the end times the inverse of that before.
+    """
+
+    p_after: FloatArray
+    T_moved: FloatArray
+
+
+def fates(before: Graph, after: Graph, poses: Tensor, transport: Transport | None) -> tuple[Tensor, Tensor]:
     """(M, FATES) of the points of s_i and (M', FATES) of those of s_i'; of single clouds.
 
-    Nearnesses, 0 to 1, of what the other state has where the point is, and of what it has where the hand's
-    motion takes the point. What is held or pushed goes with the hand, whatever the action is meant for.
+    Nearnesses, 0 to 1, of what another state has where the point is, and of what it has where the hand's
+    motion takes the point. What is held or pushed goes with the hand, whatever the action is meant for; what
+    goes with it next is what an approach is meant for.
 
     Args:
         before: s_i.
         after: s_i'.
         poses: (2, 4, 4) T_i and the gripper in s_i, world frame.
+        transport: the next one; None if it is the step itself, or there is none.
     """
     T_goal, T_now = poses.double().numpy()
     M = T_goal @ se3.invert(T_now)
     p_before, p_after = (g.points.double().numpy() for g in (before, after))
+    own = _told(p_before, p_after, M), _told(p_after, p_before, se3.invert(M))
+    next_ = own
+    if transport is not None:
+        later = transport.p_after, transport.T_moved
+        next_ = _told(p_before, *later), _told(p_after, *later)
+    fate, past = (np.concatenate(both, axis=1) for both in zip(own, next_, strict=True))
+    return torch.from_numpy(fate), torch.from_numpy(past)
 
-    def told(points: FloatArray, others: FloatArray, motion: FloatArray) -> Tensor:
-        away = [nearest(p, others)[0] for p in (points, se3.apply(motion, points))]
-        columns = [np.exp(-distance / scale) for distance in away for scale in _ALIKE]
-        return torch.from_numpy(np.concatenate(columns, axis=1).astype(np.float32))
 
-    return told(p_before, p_after, M), told(p_after, p_before, se3.invert(M))
+def _told(points: FloatArray, others: FloatArray, motion: FloatArray) -> Float32Array:
+    """(N, FATES / 2) nearnesses of points (N, 3), as they are and moved, to others (K, 3)."""
+    away = [nearest(p, others)[0] for p in (points, se3.apply(motion, points))]
+    columns = [np.exp(-distance / scale) for distance in away for scale in _ALIKE]
+    return np.concatenate(columns, axis=1).astype(np.float32)
 
 
-def one_step(before: Graph, after: Graph, poses: Tensor, gripper: Tensor, neighbours: int) -> StepBatch:
+def next_transport(opened: Sequence[bool], step: int) -> int:
+    """The first step, from `step` on, that begins with closed fingers; `step` if there is none.
+
+    Args:
+        opened: whether the gripper is open before each step of a demonstration.
+        step: number.
+    """
+    return next((k for k in range(step, len(opened)) if not opened[k]), step)
+
+
+def one_step(
+    before: Graph,
+    after: Graph,
+    poses: Tensor,
+    gripper: Tensor,
+    neighbours: int,
+    transport: Transport | None = None,
+) -> StepBatch:
     """A batch of one step.
 
     Args:
@@ -123,8 +164,9 @@ def one_step(before: Graph, after: Graph, poses: Tensor, gripper: Tensor, neighb
         poses: (2, 4, 4) T_i and the gripper in s_i, world frame.
         gripper: (2,) whether it is open in s_i, and after the action.
         neighbours: K of the cross attention.
+        transport: see `fates`.
     """
-    cross, told = cross_neighbours(before, after, neighbours), fates(before, after, poses)
+    cross, told = cross_neighbours(before, after, neighbours), fates(before, after, poses, transport)
     return StepBatch(before, after, poses[:1], poses[1:], gripper[None], *cross, *told)
 
 

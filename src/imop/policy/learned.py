@@ -16,10 +16,10 @@ from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, farthest_points
 from imop.geometry.clusters import connected, find_objects
 from imop.geometry.neighbours import nearest, within
-from imop.networks.graph import Graph, build_graph
+from imop.networks.graph import Graph, GraphConfig, build_graph
 from imop.networks.matching import reposition
 from imop.networks.model import Model
-from imop.networks.region import StepBatch, one_step
+from imop.networks.region import StepBatch, Transport, next_transport, one_step
 from imop.policy.contacts import SAME, Contacts, find_contacts, is_open
 from imop.policy.interfaces import BEGINNING, Candidate, Feasible, PolicyConfig, Progress, Scene, Transition
 from imop.policy.proposals import Asked, Matches
@@ -130,11 +130,15 @@ def find_shown_regions(model: Model, steps: Sequence[Transition], config: Policy
     objects = [find_objects(step.before.cloud, step.before.ground.plane) for step in steps]
     contacts = find_contacts(steps, objects)
     instead = [find_region(steps, k, objects[k], contacts, config).cloud for k in range(len(steps))]
-    return [_find(model, steps, k, contacts, config, instead[k].points) for k in range(len(steps))]
+    batches = _batches(model.config.graph, steps)
+    return [
+        _find(model, batches[k], steps, k, contacts, config, instead[k].points) for k in range(len(steps))
+    ]
 
 
 def _find(
     model: Model,
+    batch: StepBatch,
     steps: Sequence[Transition],
     k: int,
     contacts: Contacts,
@@ -142,12 +146,10 @@ def _find(
     instead: FloatArray,
 ) -> ShownRegion:
     """The region of step `k`, or what is at points (M, 3) `instead` if that cannot be the region."""
-    step, shape = steps[k], model.config.graph
-    before, after = (build_graph(s.cloud, shape, s.ground) for s in (step.before, step.after))
-    batch = _batch(step, before, after, shape.neighbours)
+    step = steps[k]
     with torch.inference_mode():
         predicted = model.region(batch)
-    nodes = before.points.double().numpy()
+    nodes = batch.before.points.double().numpy()
     meant = torch.from_numpy(step.before.focused(nodes, SAME))
     probability = torch.where(meant, predicted.probability, 0.0) if meant.any() else predicted.probability
     inside = _likely(probability, config.threshold)
@@ -175,11 +177,23 @@ def _away(step: Transition, p_gripper_held: FloatArray, points: FloatArray) -> f
     return float(nearest(p_goal, points)[0].min())
 
 
-def _batch(step: Transition, before: Graph, after: Graph, neighbours: int) -> StepBatch:
-    observation, action = step.before.observation, step.action
-    poses = np.stack([action.T_world_gripper, observation.T_world_gripper])
-    gripper = torch.tensor([is_open(step), action.gripper_open], dtype=torch.float32)
-    return one_step(before, after, torch.from_numpy(poses.astype(np.float32)), gripper, neighbours)
+def _batches(shape: GraphConfig, steps: Sequence[Transition]) -> list[StepBatch]:
+    """The steps of one demonstration, each alone, as the networks see them."""
+    scenes = {id(scene): scene for step in steps for scene in (step.before, step.after)}
+    graphs = {key: build_graph(scene.cloud, shape, scene.ground) for key, scene in scenes.items()}
+    opened = [is_open(step) for step in steps]
+    found = []
+    for k, step in enumerate(steps):
+        observation, action = step.before.observation, step.action
+        poses = np.stack([action.T_world_gripper, observation.T_world_gripper]).astype(np.float32)
+        gripper = torch.tensor([opened[k], action.gripper_open], dtype=torch.float32)
+        before, after = graphs[id(step.before)], graphs[id(step.after)]
+        later, transport = steps[next_transport(opened, k)], None
+        if later is not step:
+            begin, end = (s.observation.T_world_gripper for s in (later.before, later.after))
+            transport = Transport(graphs[id(later.after)].points.double().numpy(), end @ se3.invert(begin))
+        found.append(one_step(before, after, torch.from_numpy(poses), gripper, shape.neighbours, transport))
+    return found
 
 
 def _likely(probability: Tensor, threshold: float) -> Tensor:

@@ -10,7 +10,7 @@ from imop.geometry import se3
 from imop.geometry.cloud import PointCloud
 from imop.networks.graph import Graph
 from imop.training.camera_error import camera_errors
-from imop.training.pairs import StepPair
+from imop.training.pairs import Carry, StepPair
 from imop.types import BoolArray, FloatArray
 
 MOVE = 0.15
@@ -48,6 +48,7 @@ def augment(pair: StepPair, rng: np.random.Generator) -> StepPair:
         T_world_goal=A @ pair.T_world_goal,
         T_world_now=A @ pair.T_world_now,
         T_query_support=B @ pair.T_query_support @ se3.invert(A),
+        carry=pair.carry and Carry(_moved(_worse(pair.carry.after, rng)[0], A), A @ pair.carry.T_world_hand),
     )
 
 
@@ -68,6 +69,7 @@ def mirrored(pair: StepPair) -> StepPair:
         T_world_goal=M @ pair.T_world_goal @ M,
         T_world_now=M @ pair.T_world_now @ M,
         T_query_support=M @ pair.T_query_support @ M,
+        carry=pair.carry and Carry(cloud(pair.carry.after), M @ pair.carry.T_world_hand @ M),
     )
 
 

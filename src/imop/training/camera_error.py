@@ -32,6 +32,7 @@ def camera_errors(pair: StepPair, rng: np.random.Generator) -> StepPair:
         support=views_moved(pair.support, shown),
         after=views_moved(pair.after, shown),
         query=views_moved(pair.query, seen),
+        carry=pair.carry and replace(pair.carry, after=views_moved(pair.carry.after, shown)),
     )
 
 

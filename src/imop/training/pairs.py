@@ -12,12 +12,25 @@ from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, farthest_points
 from imop.geometry.neighbours import nearest
-from imop.networks.graph import Graph, GraphConfig, build_graph, collate
-from imop.networks.region import StepBatch, cross_neighbours, fates
+from imop.networks.graph import Graph, GraphConfig, build_graph, collate, thin
+from imop.networks.region import StepBatch, Transport, cross_neighbours, fates
 from imop.types import BoolArray, FloatArray, as_array, as_pose
 
 # A region point and its counterpart in the query are at most this far apart after the true motion, metres.
 MATCH_RADIUS = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Carry:
+    """A later step of the demonstration that begins with closed fingers: what is taken goes with the hand.
+
+    Attributes:
+        after: the state that it led to.
+        T_world_hand: (2, 4, 4) the gripper when it began and when it ended.
+    """
+
+    after: PointCloud
+    T_world_hand: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +50,7 @@ class StepPair:
         invariance: (N,) how far points of the region are from their counterparts on the query's thing, both
             seen from the action, metres; NaN outside the region and where it is not known. None if the
             shapes are equal: all zero.
+        carry: the next one; None if it is this step, or there is none.
     """
 
     support: PointCloud
@@ -48,6 +62,7 @@ class StepPair:
     gripper_open: tuple[bool, bool]
     T_query_support: FloatArray
     invariance: FloatArray | None = None
+    carry: Carry | None = None
 
     def __post_init__(self) -> None:
         for name in ("support", "after", "query"):
@@ -64,6 +79,9 @@ class StepPair:
             raise InvalidInput("T_query_support", "no motion", "at least one right motion")
         if self.invariance is not None:
             as_array("invariance", self.invariance, (len(self.support),), np.float64)
+        if self.carry is not None:
+            for T in as_array("carry", self.carry.T_world_hand, (2, 4, 4)):
+                as_pose("carry", T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,13 +182,20 @@ def make_sample(
         poses,
         torch.tensor(pair.gripper_open, dtype=torch.float32),
         *cross_neighbours(before, after, config.neighbours),
-        *fates(before, after, poses),
+        *fates(before, after, poses, _transport(pair, config)),
         torch.from_numpy(label.astype(np.float32)),
         torch.from_numpy(np.where(label, far, np.nan).astype(np.float32)),
         torch.from_numpy(chosen),
         match_targets(p_before[chosen], matched[chosen], query, pair.T_query_support),
         torch.from_numpy(np.array(pair.T_query_support, dtype=np.float64)),
     )
+
+
+def _transport(pair: StepPair, config: GraphConfig) -> Transport | None:
+    if pair.carry is None:
+        return None
+    T_begin, T_end = pair.carry.T_world_hand
+    return Transport(thin(pair.carry.after, config)[0].points, T_end @ se3.invert(T_begin))
 
 
 def match_targets(

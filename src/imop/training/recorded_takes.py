@@ -12,8 +12,9 @@ from imop.demos.regions import SegmentedState, invariant_region, segmented
 from imop.geometry.cloud import PointCloud
 from imop.geometry.perception import Perception, RobotMask
 from imop.networks.graph import thin
+from imop.networks.region import next_transport
 from imop.training.invariance import INVARIANT
-from imop.training.pairs import StepPair
+from imop.training.pairs import Carry, StepPair
 from imop.training.stage import STORED
 from imop.training.symmetry import Scene, Surface, equal_motions
 from imop.types import BoolArray, Demonstration, FloatArray, Observation
@@ -124,4 +125,13 @@ def step_pair(support: Take, query: Take, step: int, names: Sequence[str], motio
         keyframe.observation.T_world_gripper,
         (keyframe.observation.gripper_opening > OPEN, keyframe.action.gripper_open),
         motions,
+        carry=_carry(support, step),
     )
+
+
+def _carry(shown: Take, step: int) -> Carry | None:
+    keyframes = shown.demonstration.keyframes
+    carry = next_transport([k.observation.gripper_opening > OPEN for k in keyframes], step)
+    states = (*(k.observation for k in keyframes), shown.demonstration.final)
+    hands = [observation.T_world_gripper for observation in states[carry : carry + 2]]
+    return Carry(shown.clouds[carry + 1], np.stack(hands)) if carry != step else None

@@ -1,6 +1,6 @@
 """Pairs in files: clouds are stored once, however many pairs share them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,26 +10,28 @@ from numpy.typing import NDArray
 from imop.errors import CorruptData
 from imop.files import replaced
 from imop.geometry.cloud import PointCloud
-from imop.training.pairs import StepPair
+from imop.training.pairs import Carry, StepPair
+from imop.types import FloatArray
 
-VERSION = 1
+VERSION = 2
 
 Arrays = Mapping[str, NDArray[Any]]
 
 
 def write_shard(pairs: Sequence[StepPair], path: Path) -> None:
     """Write pairs as one compressed .npz file, whole or not at all."""
-    clouds = {id(c): c for pair in pairs for c in (pair.support, pair.after, pair.query)}
+    clouds = {id(c): c for pair in pairs for c in _clouds(pair)}
     number = {key: i for i, key in enumerate(clouds)}
     arrays: dict[str, NDArray[Any]] = {
         "version": np.array(VERSION),
         **cloud_arrays(list(clouds.values())),
-        "pair_clouds": np.array([[number[id(c)] for c in (p.support, p.after, p.query)] for p in pairs]),
+        "pair_clouds": np.array([[number[id(c)] for c in _clouds(p)] for p in pairs]),
         "region": np.concatenate([p.region for p in pairs]),
         "region_start": starts([len(p.region) for p in pairs]),
         "invariance": np.concatenate([_invariance(p) for p in pairs]),
         "other_shape": np.array([p.invariance is not None for p in pairs]),
-        "poses": np.stack([np.stack([p.T_world_goal, p.T_world_now]) for p in pairs]),
+        "poses": np.stack([np.stack([p.T_world_goal, p.T_world_now, *_hands(p)]) for p in pairs]),
+        "carried": np.array([p.carry is not None for p in pairs]),
         "gripper": np.array([p.gripper_open for p in pairs]),
         "motions": np.concatenate([p.T_query_support for p in pairs]),
         "motion_start": starts([len(p.T_query_support) for p in pairs]),
@@ -53,20 +55,19 @@ class Shard:
     @property
     def clouds(self) -> NDArray[np.int64]:
         """(N, 3) numbers of the clouds of each pair: s_i, s_i', s_j; equal numbers are the same cloud."""
-        return self._arrays["pair_clouds"]
+        return self._arrays["pair_clouds"][:, :3]
 
     def __getitem__(self, index: int) -> StepPair:
         a = self._arrays
-        support, after, query = (read_cloud(a, int(c)) for c in a["pair_clouds"][index])
+        support, after, query, later = (read_cloud(a, int(c)) for c in a["pair_clouds"][index])
         first, last = a["region_start"][index : index + 2]
         begin, end = a["motion_start"][index : index + 2]
-        goal, now = a["poses"][index]
+        goal, now, *hands = a["poses"][index]
         opened = (bool(a["gripper"][index, 0]), bool(a["gripper"][index, 1]))
         region, motions = a["region"][first:last], a["motions"][begin:end]
-        # Shards without these arrays show equal things twice.
-        other = "other_shape" in a and a["other_shape"][index]
-        invariance = a["invariance"][first:last].astype(np.float64) if other else None
-        return StepPair(support, after, query, region, goal, now, opened, motions, invariance)
+        invariance = a["invariance"][first:last].astype(np.float64) if a["other_shape"][index] else None
+        carry = Carry(later, np.stack(hands)) if a["carried"][index] else None
+        return StepPair(support, after, query, region, goal, now, opened, motions, invariance, carry)
 
 
 def cloud_arrays(clouds: Sequence[PointCloud]) -> dict[str, NDArray[Any]]:
@@ -118,6 +119,15 @@ def read_arrays(path: Path, version: int, wanted: str) -> dict[str, NDArray[Any]
 def starts(lengths: Sequence[int]) -> NDArray[np.int64]:
     """(N + 1,) where each of N parts of the given lengths begins, and the end."""
     return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+
+
+def _clouds(pair: StepPair) -> tuple[PointCloud, PointCloud, PointCloud, PointCloud]:
+    """s_i, s_i', s_j and the state after the next carry, or s_i' again."""
+    return pair.support, pair.after, pair.query, pair.after if pair.carry is None else pair.carry.after
+
+
+def _hands(pair: StepPair) -> Iterable[FloatArray]:
+    return np.stack([np.eye(4), np.eye(4)]) if pair.carry is None else pair.carry.T_world_hand
 
 
 def _invariance(pair: StepPair) -> NDArray[np.float16]:
