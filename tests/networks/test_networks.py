@@ -18,6 +18,8 @@ from imop.networks.region import (
     RegionNetwork,
     RegionPrediction,
     StepBatch,
+    Transport,
+    next_transport,
     one_step,
 )
 from tests.networks.scenes import SMALL, tabletop
@@ -127,6 +129,27 @@ def test_what_is_held_goes_with_the_hand_and_the_rest_stays():
     back = step(after, before, NOW, GOAL)
     torch.testing.assert_close(back.past, seen.fate)
     torch.testing.assert_close(back.fate, seen.past)
+
+
+def test_what_is_taken_next_goes_with_the_hand_then():
+    scene = tabletop()
+    held = scene.colors[:, 0] > 0.7
+    M = GOAL @ se3.invert(NOW)
+    carried = replace(scene, points=np.where(held[:, None], se3.apply(M, scene.points), scene.points))
+    graph, later = build_graph(scene, SMALL), build_graph(carried, SMALL)
+    poses = torch.from_numpy(np.stack([NOW, GOAL])).float()
+    transport = Transport(later.points.double().numpy(), M)
+    seen = one_step(graph, graph, poses, torch.tensor([1.0, 0.0]), 8, transport)
+    stayed, went = seen.fate[:, 4:6].mean(dim=1), seen.fate[:, 6:].mean(dim=1)
+    held = graph.features[:, 0] > 0.2
+    assert torch.all(seen.fate[:, :2] == 1)
+    assert went[held].median() > 0.6 > 0.3 > stayed[held].median()
+    assert stayed[~held].median() > 0.6
+
+
+def test_the_next_transport_begins_with_closed_fingers():
+    opened = [True, True, False, False, True, True]
+    assert [next_transport(opened, k) for k in range(6)] == [2, 2, 2, 3, 4, 5]
 
 
 def test_region_of_a_batch_is_that_of_its_steps():

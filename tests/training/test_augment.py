@@ -6,6 +6,7 @@ import pytest
 from imop.geometry import se3
 from imop.geometry.neighbours import nearest
 from imop.training.augment import JITTER, MOVE, augment, mirrored
+from imop.training.pairs import Carry
 from tests.training.test_pairs import MOTION, pair
 
 
@@ -37,6 +38,18 @@ def test_a_mirrored_pair_is_still_true_and_mirrored_twice_the_same():
         se3.rotate(changed.T_world_goal, np.array([[0.0, -1.0, 0.0]])), closing * (1, -1, 1), atol=1e-12
     )
     np.testing.assert_array_equal(mirrored(changed).query.points, before.query.points)
+
+
+@pytest.mark.parametrize("change", [mirrored, lambda p: augment(p, np.random.default_rng(0))])
+def test_what_is_carried_next_moves_with_its_scene(change):
+    before = pair()
+    hands = np.stack([before.T_world_now, before.T_world_goal])
+    changed = change(replace(before, carry=Carry(before.support, hands)))
+    assert changed.carry is not None
+    np.testing.assert_allclose(changed.carry.T_world_hand[0], changed.T_world_now, atol=1e-12)
+    np.testing.assert_allclose(changed.carry.T_world_hand[1], changed.T_world_goal, atol=1e-12)
+    distance, _ = nearest(changed.carry.after.points, changed.support.points)
+    assert np.median(distance) < 0.01
 
 
 def test_both_a_pair_and_its_mirror_image_are_drawn():

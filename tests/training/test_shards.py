@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from imop.errors import CorruptData
+from imop.training.pairs import Carry
 from imop.training.shards import Shard, write_shard
+from tests.networks.scenes import tabletop
+from tests.networks.test_networks import GOAL, NOW
 from tests.training.test_pairs import pair
 
 
@@ -36,15 +39,14 @@ def test_labels_of_other_instances_are_kept_and_equal_ones_stay_without(tmp_path
     np.testing.assert_allclose(shard[1].invariance, label, atol=1e-4)
 
 
-def test_shards_without_labels_are_read_as_equal_things(tmp_path):
-    path = tmp_path / "old.npz"
-    write_shard([pair()], path)
-    with np.load(path) as file:
-        old = {name: file[name] for name in file.files if name not in ("invariance", "other_shape")}
-    np.savez_compressed(path, **old)
-    read = Shard(path)[0]
-    assert read.invariance is None
-    np.testing.assert_array_equal(read.region, pair().region)
+def test_the_next_carry_is_kept_and_none_stays_none(tmp_path):
+    hands = np.stack([GOAL, NOW])
+    first, second = pair(0), replace(pair(1), carry=Carry(tabletop(7), hands))
+    write_shard([first, second], tmp_path / "a.npz")
+    without, read = Shard(tmp_path / "a.npz")[0].carry, Shard(tmp_path / "a.npz")[1].carry
+    assert without is None and read is not None
+    np.testing.assert_allclose(read.after.points, tabletop(7).points, atol=1e-6)
+    np.testing.assert_allclose(read.T_world_hand, hands)
 
 
 def test_shared_clouds_are_stored_once(tmp_path):

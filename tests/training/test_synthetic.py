@@ -136,3 +136,22 @@ def test_generation_goes_on_where_it_stopped(tmp_path):
     path.write_bytes(first[:1000])
     generate(tmp_path, 3, seed=0, jobs=1)
     assert len(Shard(path)) == 3
+
+
+def test_what_an_approach_is_meant_for_goes_with_the_hand_next():
+    """Of steps before a grasp, more of the points next to the goal go with the next carry than elsewhere."""
+    near_shares, far_shares = [], []
+    for pair in synthetic_pairs(5, 16, TRAINING, kinds=("carry", "unpack")):
+        if pair.carry is None:
+            continue
+        T_begin, T_end = pair.carry.T_world_hand
+        points = pair.support.points[pair.support.points[:, 2] > pair.support.points[:, 2].min() + 0.01]
+        moved = se3.apply(T_end @ se3.invert(T_begin), points)
+        went = nearest(moved, pair.carry.after.points)[0][:, 0] < 0.012
+        went &= nearest(points, pair.carry.after.points)[0][:, 0] > 0.012
+        near = np.linalg.norm(points - T_begin[:3, 3], axis=1) < 0.04
+        if near.any() and not near.all():
+            near_shares.append(went[near].mean())
+            far_shares.append(went[~near].mean())
+    assert len(near_shares) >= 4
+    assert np.median(near_shares) > 0.5 > 0.1 > np.median(far_shares)
