@@ -21,7 +21,7 @@ from rich.table import Table
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.benchmark import count_of, tried
 from imop.evaluation.episodes import Episode
-from imop.evaluation.report import markdown_table, save_json
+from imop.evaluation.report import console_for_tables, markdown_table, save_json
 from imop.evaluation.statistics import wilson
 from imop.evaluation.trials import Trial
 from imop.files import replaced, writable_folder
@@ -182,9 +182,7 @@ def show(cells: Cells, method: str, console: Console) -> None:
 
 def main() -> int:
     options = tyro.cli(Options, description=__doc__)
-    console = Console()
-    # A pipe has no width of its own; the table needs this one.
-    console = console if console.is_terminal else Console(width=150)
+    console = console_for_tables()
     try:
         writable_folder(options.out)
         cells = measure(options, console)

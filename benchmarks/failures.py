@@ -27,6 +27,7 @@ from imop.evaluation.causes import Cause, Diagnosis, diagnose
 from imop.evaluation.episodes import read_episodes
 from imop.evaluation.jobs import parallel
 from imop.evaluation.picture import save_picture
+from imop.evaluation.report import console_for_tables
 from imop.evaluation.trials import Trial, demonstration_for
 from imop.files import replaced
 
@@ -125,9 +126,7 @@ def draw(found: list[Found], out: Path) -> None:
 
 def main() -> int:
     options = tyro.cli(Options, description=__doc__)
-    console = Console()
-    # A pipe has no width of its own; the table needs this one.
-    console = console if console.is_terminal else Console(width=150)
+    console = console_for_tables()
     try:
         groups = together(failed(options))
         work = [delayed(look)(group, options.method, options.weights) for group in groups]

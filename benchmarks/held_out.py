@@ -31,7 +31,7 @@ from rich.console import Console
 from rich.table import Table
 
 from imop.errors import ImopError
-from imop.evaluation.report import save_json
+from imop.evaluation.report import console_for_tables, save_json
 from imop.evaluation.statistics import wilson
 from imop.evaluation.textbook import TextbookMatcher
 from imop.geometry import se3
@@ -250,8 +250,7 @@ def measure(options: Options) -> dict[str, list[Row]]:
 
 def main() -> int:
     options = tyro.cli(Options, description=__doc__)
-    console = Console()
-    console = console if console.is_terminal else Console(width=120)
+    console = console_for_tables()
     try:
         rows = measure(options)
     except ImopError as error:

@@ -37,6 +37,7 @@ from imop.evaluation.open_loop import Case, RecordedPoses, ask
 from imop.evaluation.open_loop_rows import Row, by_task
 from imop.evaluation.oracle import OraclePolicy
 from imop.evaluation.picture import Panel, save_picture
+from imop.evaluation.report import console_for_tables
 from imop.files import replaced
 from imop.geometry.accuracy import COARSE
 from imop.types import Action
@@ -157,9 +158,7 @@ def measure(options: Options, console: Console) -> dict[str, dict[str, Any]]:
 
 def main() -> int:
     options = tyro.cli(Options, description=__doc__)
-    console = Console()
-    # A pipe has no width of its own; the table needs this one.
-    console = console if console.is_terminal else Console(width=150)
+    console = console_for_tables()
     started = time.perf_counter()
     try:
         results = measure(options, console)

@@ -23,7 +23,7 @@ from rich.console import Console
 from rich.table import Table
 
 from imop.errors import CorruptData, ImopError, InvalidInput
-from imop.evaluation.report import save_json
+from imop.evaluation.report import console_for_tables, save_json
 from imop.evaluation.statistics import wilson
 from imop.extras import extra
 from imop.files import read, replaced
@@ -296,9 +296,7 @@ def results_of(options: Options) -> dict[str, Reliability]:
 
 def main() -> int:
     options = tyro.cli(Options, description=__doc__)
-    console = Console()
-    # A pipe has no width of its own; the tables need this one.
-    console = console if console.is_terminal else Console(width=150)
+    console = console_for_tables()
     try:
         results = results_of(options)
     except ImopError as error:

@@ -22,6 +22,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
+from imop.evaluation.report import console_for_tables
 from imop.evaluation.statistics import wilson
 from imop.networks.model import BUNDLED, Model, load_model
 from imop.policy.router import Odds, prior
@@ -122,8 +123,8 @@ def main() -> int:
     shards = [RouteShard(path) for path in sorted(options.routes.glob("*.npz"))]
     found = [row for shard in shards for i in range(len(shard)) for row in rows(model, shard[i])]
     table = accuracy(found, options.share)
-    console = Console()
-    show(table, options.share, console if console.is_terminal else Console(width=120))
+    console = console_for_tables()
+    show(table, options.share, console)
     if options.json:
         report = {
             "rows": table,

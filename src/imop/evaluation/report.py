@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from rich.console import Console
 from rich.table import Table
 
 from imop.evaluation.statistics import wilson
@@ -130,3 +131,9 @@ def markdown_table(header: Sequence[str], body: Iterable[Sequence[str]]) -> list
     """The lines of a table."""
     rule = "|" + "---|" * len(header)
     return [f"| {' | '.join(header)} |", rule, *(f"| {' | '.join(row)} |" for row in body)]
+
+
+def console_for_tables() -> Console:
+    """Standard output; a pipe has no width of its own and gets one that the tables fit into."""
+    console = Console()
+    return console if console.is_terminal else Console(width=150)
