@@ -5,6 +5,7 @@ import pytest
 
 from imop.geometry import se3
 from imop.training.camera_error import BAD, camera_errors
+from imop.training.pairs import Carry
 from tests.training.test_pairs import pair
 
 
@@ -69,3 +70,14 @@ def test_a_camera_without_points_is_no_harm():
     shown = replace(before, support=before.support.select(kept), region=before.region[kept])
     changed = camera_errors(shown, np.random.default_rng(0))
     assert len(changed.support) == len(shown.support) and len(changed.query) == len(before.query)
+
+
+def test_a_view_that_only_the_next_carry_shows_moves_too():
+    before = three_views()
+    hands = np.stack([before.T_world_now, before.T_world_goal])
+    later = replace(before.after, camera=before.after.camera + 1)
+    changed = camera_errors(replace(before, carry=Carry(later, hands)), np.random.default_rng(0))
+    assert changed.carry is not None
+    moved = np.linalg.norm(changed.carry.after.points - later.points, axis=1)
+    assert all(moved[later.camera == camera].max() > 0 for camera in (1, 2, 3))
+    np.testing.assert_array_equal(changed.carry.T_world_hand, hands)

@@ -1,5 +1,6 @@
 """What is left of wrong camera poses in fused clouds: each view's points are a little off."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +23,7 @@ def camera_errors(pair: StepPair, rng: np.random.Generator) -> StepPair:
     A camera is known by its index. Its error is mostly that of a set-up, the same in the demonstration and in
     the query. The poses and the right motions stay: the things have not moved.
     """
-    clouds = (pair.support, pair.after, pair.query)
+    clouds = (pair.support, pair.after, pair.query, *((pair.carry.after,) if pair.carry else ()))
     cameras = 1 + max(int(cloud.camera.max()) for cloud in clouds)
     centres = [_centre(clouds, camera) for camera in range(cameras)]
     shown = _errors(centres, rng)
@@ -45,7 +46,7 @@ def views_moved(cloud: PointCloud, T: FloatArray) -> PointCloud:
     return replace(cloud, points=points, normals=np.einsum("nij,nj->ni", T_point[:, :3, :3], cloud.normals))
 
 
-def _centre(clouds: tuple[PointCloud, ...], camera: int) -> FloatArray:
+def _centre(clouds: Sequence[PointCloud], camera: int) -> FloatArray:
     """(3,) the middle of what the first cloud shows that has points of the camera."""
     own = (cloud.points[cloud.camera == camera] for cloud in clouds)
     return next((points.mean(axis=0) for points in own if len(points)), np.zeros(3))
