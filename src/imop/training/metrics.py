@@ -1,16 +1,22 @@
-"""How good the networks are on pairs that they were not trained on."""
+"""How good the networks are on pairs that they were not trained on.
 
+python -m imop.training.metrics --shards DIR [DIR ...] [--weights FOLDER] [--pairs N]
+"""
+
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
+import tyro
+from rich.console import Console
 from torch import Tensor
 
 from imop.geometry import se3
 from imop.geometry.accuracy import COARSE, FINE
 from imop.networks.blocks import pad
 from imop.networks.matching import reposition
-from imop.networks.model import Model
+from imop.networks.model import BUNDLED, Model, load_model
 from imop.training import losses
 from imop.training.data import PairDataset, RouteDataset, loader
 from imop.training.objective import predicted_poses, right_poses
@@ -107,3 +113,31 @@ def _measure(model: Model, batch: PairBatch) -> dict[str, list[float]]:
             hits = [float(se3.near(r, p, *limits).any()) for r, p in zip(right, poses, strict=True)]
             measured[f"{kind}_{name}"] = hits
     return measured
+
+
+@dataclass(frozen=True)
+class MetricsOptions:
+    """What to measure.
+
+    Attributes:
+        shards: folders of shards of pairs.
+        weights: folder of the networks.
+        pairs: how many of each folder at most.
+    """
+
+    shards: tuple[Path, ...]
+    weights: Path = BUNDLED
+    pairs: int = 300
+
+
+def main() -> None:
+    """Command line."""
+    options = tyro.cli(MetricsOptions, description=__doc__)
+    model, console = load_model(options.weights), Console(soft_wrap=True)
+    for folder in options.shards:
+        found = validate(model, folder, options.pairs)
+        console.print(f"{folder.name}: " + ", ".join(f"{name} {value:.3f}" for name, value in found.items()))
+
+
+if __name__ == "__main__":
+    main()
