@@ -115,12 +115,17 @@ def test_region_does_not_change_when_the_whole_step_is_moved():
         torch.testing.assert_close(a, b, atol=1e-4, rtol=1e-3)
 
 
-def test_what_is_held_goes_with_the_hand_and_the_rest_stays():
+def a_red_box_carried():
+    """The scene before and after the hand took the tall box from `NOW` to `GOAL`."""
     scene = tabletop()
     held = scene.colors[:, 0] > 0.7
     M = GOAL @ se3.invert(NOW)
     carried = replace(scene, points=np.where(held[:, None], se3.apply(M, scene.points), scene.points))
-    before, after = build_graph(scene, SMALL), build_graph(carried, SMALL)
+    return build_graph(scene, SMALL), build_graph(carried, SMALL)
+
+
+def test_what_is_held_goes_with_the_hand_and_the_rest_stays():
+    before, after = a_red_box_carried()
     seen = step(before, after)
     stayed, went = seen.fate[:, :2].mean(dim=1), seen.fate[:, 2:4].mean(dim=1)
     held = before.features[:, 0] > 0.2
@@ -132,13 +137,9 @@ def test_what_is_held_goes_with_the_hand_and_the_rest_stays():
 
 
 def test_what_is_taken_next_goes_with_the_hand_then():
-    scene = tabletop()
-    held = scene.colors[:, 0] > 0.7
-    M = GOAL @ se3.invert(NOW)
-    carried = replace(scene, points=np.where(held[:, None], se3.apply(M, scene.points), scene.points))
-    graph, later = build_graph(scene, SMALL), build_graph(carried, SMALL)
+    graph, later = a_red_box_carried()
     poses = torch.from_numpy(np.stack([NOW, GOAL])).float()
-    transport = Transport(later.points.double().numpy(), M)
+    transport = Transport(later.points.double().numpy(), np.stack([NOW, GOAL]))
     seen = one_step(graph, graph, poses, torch.tensor([1.0, 0.0]), 8, transport)
     stayed, went = seen.fate[:, 4:6].mean(dim=1), seen.fate[:, 6:].mean(dim=1)
     held = graph.features[:, 0] > 0.2

@@ -40,7 +40,8 @@ class RegionConfig:
     Attributes:
         backbone: shared by s_i and s_i'; its first width is that of the stages.
         stages: rounds of self and cross attention, each with a prediction.
-        low_dimensional: whether the gripper's state is among the inputs (the paper's ablation).
+        low_dimensional: whether the gripper's state is among the inputs (the paper's ablation); what goes
+            with the gripper is not without it.
     """
 
     backbone: BackboneConfig = field(default_factory=lambda: BackboneConfig(inputs=REGION_INPUTS))
@@ -81,9 +82,9 @@ class StepBatch:
 
     def to(self, device: torch.device | str) -> "StepBatch":
         """The same batch on a device."""
-        rest = (self.T_world_goal, self.T_world_now, self.gripper, self.cross, self.cross_back)
-        told = (self.fate, self.past)
-        return StepBatch(self.before.to(device), self.after.to(device), *(t.to(device) for t in rest + told))
+        poses = (self.T_world_goal, self.T_world_now, self.gripper)
+        rest = (*poses, self.cross, self.cross_back, self.fate, self.past)
+        return StepBatch(self.before.to(device), self.after.to(device), *(t.to(device) for t in rest))
 
 
 def cross_neighbours(before: Graph, after: Graph, k: int) -> tuple[Tensor, Tensor]:
@@ -99,11 +100,11 @@ class Transport:
 
     Attributes:
         p_after: (K, 3) points of the state that it led to, metres.
-        T_moved: (4, 4) how the hand moved, world frame: its pose at the end times the inverse of that before.
+        T_world_hand: (2, 4, 4) the gripper when it began and when it ended.
     """
 
     p_after: FloatArray
-    T_moved: FloatArray
+    T_world_hand: FloatArray
 
 
 def fates(before: Graph, after: Graph, poses: Tensor, transport: Transport | None) -> tuple[Tensor, Tensor]:
@@ -120,15 +121,20 @@ def fates(before: Graph, after: Graph, poses: Tensor, transport: Transport | Non
         transport: the next one; None if it is the step itself, or there is none.
     """
     T_goal, T_now = poses.double().numpy()
-    M = T_goal @ se3.invert(T_now)
+    M = _motion(T_now, T_goal)
     p_before, p_after = (g.points.double().numpy() for g in (before, after))
     own = _told(p_before, p_after, M), _told(p_after, p_before, se3.invert(M))
     next_ = own
     if transport is not None:
-        later = transport.p_after, transport.T_moved
+        later = transport.p_after, _motion(*transport.T_world_hand)
         next_ = _told(p_before, *later), _told(p_after, *later)
     fate, past = (np.concatenate(both, axis=1) for both in zip(own, next_, strict=True))
     return torch.from_numpy(fate), torch.from_numpy(past)
+
+
+def _motion(T_begin: FloatArray, T_end: FloatArray) -> FloatArray:
+    """(4, 4) what takes the hand, and all that goes with it, from one pose to another."""
+    return T_end @ se3.invert(T_begin)
 
 
 def _told(points: FloatArray, others: FloatArray, motion: FloatArray) -> Float32Array:

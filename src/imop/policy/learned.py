@@ -190,8 +190,9 @@ def _batches(shape: GraphConfig, steps: Sequence[Transition]) -> list[StepBatch]
         before, after = graphs[id(step.before)], graphs[id(step.after)]
         later, transport = steps[next_transport(opened, k)], None
         if later is not step:
-            begin, end = (s.observation.T_world_gripper for s in (later.before, later.after))
-            transport = Transport(graphs[id(later.after)].points.double().numpy(), end @ se3.invert(begin))
+            begins, ends = later.before, later.after
+            hands = np.stack([scene.observation.T_world_gripper for scene in (begins, ends)])
+            transport = Transport(graphs[id(ends)].points.double().numpy(), hands)
         found.append(one_step(before, after, torch.from_numpy(poses), gripper, shape.neighbours, transport))
     return found
 

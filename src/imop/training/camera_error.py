@@ -23,9 +23,8 @@ def camera_errors(pair: StepPair, rng: np.random.Generator) -> StepPair:
     A camera is known by its index. Its error is mostly that of a set-up, the same in the demonstration and in
     the query. The poses and the right motions stay: the things have not moved.
     """
-    clouds = (pair.support, pair.after, pair.query, *((pair.carry.after,) if pair.carry else ()))
-    cameras = 1 + max(int(cloud.camera.max()) for cloud in clouds)
-    centres = [_centre(clouds, camera) for camera in range(cameras)]
+    cameras = 1 + max(int(cloud.camera.max()) for cloud in pair.clouds)
+    centres = [_centre(pair.clouds, camera) for camera in range(cameras)]
     shown = _errors(centres, rng)
     seen = _errors(centres, rng) if rng.random() < KNOCKED else shown
     return replace(

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import torch
 import tyro
-from rich.console import Console
 from torch import Tensor
 
 from imop.geometry import se3
@@ -133,10 +132,10 @@ class MetricsOptions:
 def main() -> None:
     """Command line."""
     options = tyro.cli(MetricsOptions, description=__doc__)
-    model, console = load_model(options.weights), Console(soft_wrap=True)
+    model = load_model(options.weights)
     for folder in options.shards:
         found = validate(model, folder, options.pairs)
-        console.print(f"{folder.name}: " + ", ".join(f"{name} {value:.3f}" for name, value in found.items()))
+        print(f"{folder.name}: " + ", ".join(f"{name} {value:.3f}" for name, value in found.items()))
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, farthest_points
 from imop.geometry.neighbours import nearest
 from imop.networks.graph import Graph, GraphConfig, build_graph, collate, thin
-from imop.networks.region import StepBatch, Transport, cross_neighbours, fates
+from imop.networks.region import StepBatch, Transport, cross_neighbours, fates, next_transport
 from imop.types import BoolArray, FloatArray, as_array, as_pose
 
 # A region point and its counterpart in the query are at most this far apart after the true motion, metres.
@@ -31,6 +31,21 @@ class Carry:
 
     after: PointCloud
     T_world_hand: FloatArray
+
+
+def next_carry(
+    opened: Sequence[bool], T_world_hand: Sequence[FloatArray], clouds: Sequence[PointCloud], step: int
+) -> Carry | None:
+    """The next carry after a step; None if it is the step itself, or there is none.
+
+    Args:
+        opened: whether the gripper is open before each step of a demonstration.
+        T_world_hand: (4, 4) the gripper before each step, and after the last.
+        clouds: of the same states.
+        step: number.
+    """
+    carry = next_transport(opened, step)
+    return None if carry == step else Carry(clouds[carry + 1], np.stack(T_world_hand[carry : carry + 2]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +78,11 @@ class StepPair:
     T_query_support: FloatArray
     invariance: FloatArray | None = None
     carry: Carry | None = None
+
+    @property
+    def clouds(self) -> tuple[PointCloud, PointCloud, PointCloud, PointCloud]:
+        """s_i, s_i', s_j and the state after the next carry; s_i' again if there is none."""
+        return self.support, self.after, self.query, self.after if self.carry is None else self.carry.after
 
     def __post_init__(self) -> None:
         for name in ("support", "after", "query"):
@@ -194,8 +214,7 @@ def make_sample(
 def _transport(pair: StepPair, config: GraphConfig) -> Transport | None:
     if pair.carry is None:
         return None
-    T_begin, T_end = pair.carry.T_world_hand
-    return Transport(thin(pair.carry.after, config)[0].points, T_end @ se3.invert(T_begin))
+    return Transport(thin(pair.carry.after, config)[0].points, pair.carry.T_world_hand)
 
 
 def match_targets(

@@ -12,9 +12,8 @@ from imop.demos.regions import SegmentedState, invariant_region, segmented
 from imop.geometry.cloud import PointCloud
 from imop.geometry.perception import Perception, RobotMask
 from imop.networks.graph import thin
-from imop.networks.region import next_transport
 from imop.training.invariance import INVARIANT
-from imop.training.pairs import Carry, StepPair
+from imop.training.pairs import StepPair, next_carry
 from imop.training.stage import STORED
 from imop.training.symmetry import Scene, Surface, equal_motions
 from imop.types import BoolArray, Demonstration, FloatArray, Observation
@@ -116,6 +115,9 @@ def visible(support: Take, query: Take, step: int, names: Sequence[str]) -> bool
 def step_pair(support: Take, query: Take, step: int, names: Sequence[str], motions: FloatArray) -> StepPair:
     """The pair of a step whose region is these instances, with the right motions (S, 4, 4)."""
     keyframe = support.demonstration.keyframes[step]
+    before = [k.observation for k in support.demonstration.keyframes]
+    opened = [observation.gripper_opening > OPEN for observation in before]
+    hands = [observation.T_world_gripper for observation in (*before, support.demonstration.final)]
     return StepPair(
         support.clouds[step],
         support.clouds[step + 1],
@@ -123,15 +125,7 @@ def step_pair(support: Take, query: Take, step: int, names: Sequence[str], motio
         support.shows(support.clouds[step], step, names),
         keyframe.action.T_world_gripper,
         keyframe.observation.T_world_gripper,
-        (keyframe.observation.gripper_opening > OPEN, keyframe.action.gripper_open),
+        (opened[step], keyframe.action.gripper_open),
         motions,
-        carry=_carry(support, step),
+        carry=next_carry(opened, hands, support.clouds, step),
     )
-
-
-def _carry(shown: Take, step: int) -> Carry | None:
-    keyframes = shown.demonstration.keyframes
-    carry = next_transport([k.observation.gripper_opening > OPEN for k in keyframes], step)
-    states = (*(k.observation for k in keyframes), shown.demonstration.final)
-    hands = [observation.T_world_gripper for observation in states[carry : carry + 2]]
-    return Carry(shown.clouds[carry + 1], np.stack(hands)) if carry != step else None

@@ -1,6 +1,6 @@
 """Pairs in files: clouds are stored once, however many pairs share them."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +20,12 @@ Arrays = Mapping[str, NDArray[Any]]
 
 def write_shard(pairs: Sequence[StepPair], path: Path) -> None:
     """Write pairs as one compressed .npz file, whole or not at all."""
-    clouds = {id(c): c for pair in pairs for c in _clouds(pair)}
+    clouds = {id(c): c for pair in pairs for c in pair.clouds}
     number = {key: i for i, key in enumerate(clouds)}
     arrays: dict[str, NDArray[Any]] = {
         "version": np.array(VERSION),
         **cloud_arrays(list(clouds.values())),
-        "pair_clouds": np.array([[number[id(c)] for c in _clouds(p)] for p in pairs]),
+        "pair_clouds": np.array([[number[id(c)] for c in p.clouds] for p in pairs]),
         "region": np.concatenate([p.region for p in pairs]),
         "region_start": starts([len(p.region) for p in pairs]),
         "invariance": np.concatenate([_invariance(p) for p in pairs]),
@@ -121,12 +121,8 @@ def starts(lengths: Sequence[int]) -> NDArray[np.int64]:
     return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
 
 
-def _clouds(pair: StepPair) -> tuple[PointCloud, PointCloud, PointCloud, PointCloud]:
-    """s_i, s_i', s_j and the state after the next carry, or s_i' again."""
-    return pair.support, pair.after, pair.query, pair.after if pair.carry is None else pair.carry.after
-
-
-def _hands(pair: StepPair) -> Iterable[FloatArray]:
+def _hands(pair: StepPair) -> FloatArray:
+    """(2, 4, 4), identities without a carry."""
     return np.stack([np.eye(4), np.eye(4)]) if pair.carry is None else pair.carry.T_world_hand
 
 

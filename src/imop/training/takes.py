@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud
-from imop.networks.region import next_transport
 from imop.sim.depth_noise import DepthNoise
 from imop.training.families.thing import Thing, revolution
-from imop.training.pairs import Carry, StepPair
+from imop.training.pairs import StepPair, next_carry
 from imop.training.scenes import Scene, demonstrate
 from imop.training.stage import State
 from imop.types import FloatArray, Observation
@@ -124,6 +123,7 @@ def seen_pair(
     in_query = np.isin(seen, instances(asked_scene, members))
     if region.sum() < _FEWEST_REGION or in_query.sum() < _FEWEST_QUERY:
         return None
+    opened = [state.gripper_open for state in support.states[:-1]]
     return StepPair(
         support.clouds[step],
         support.clouds[step + 1],
@@ -133,14 +133,8 @@ def seen_pair(
         support.states[step].T_world_gripper,
         (support.states[step].gripper_open, support.states[step + 1].gripper_open),
         motions,
-        carry=_carry(support, step),
+        carry=next_carry(opened, [state.T_world_gripper for state in support.states], support.clouds, step),
     )
-
-
-def _carry(shown: Take, step: int) -> Carry | None:
-    carry = next_transport([state.gripper_open for state in shown.states[:-1]], step)
-    hands = [state.T_world_gripper for state in shown.states[carry : carry + 2]]
-    return Carry(shown.clouds[carry + 1], np.stack(hands)) if carry != step else None
 
 
 def reference(scene: Scene, step: int) -> tuple[int, str]:
