@@ -1,12 +1,12 @@
 """The same things to do with other things of the same kind: other colours, another shape, or both."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
 
 from imop.errors import InvalidInput
+from imop.training.families.marked import telling
 from imop.training.families.redraw import Diverged
 from imop.training.families.thing import Family
 from imop.training.plans import Draw, Plan
@@ -17,6 +17,10 @@ Variation = Literal["same", "color", "shape", "both"]
 VARIATIONS: tuple[Variation, ...] = get_args(Variation)
 _CHANGED = 0.6
 """How often each of several things is another one; one is always."""
+_TOLD = 0.5
+"""How often a thing whose colours change is told from others of its kind by a part that keeps its own."""
+_ALIKE = 0.5
+"""How often things of the same shape that are told by their colours all change it."""
 
 
 def shares(mix: Sequence[float]) -> dict[Variation, float]:
@@ -36,7 +40,9 @@ def other_instances(
 ) -> tuple[Plan, Plan, frozenset[int]]:
     """The plan and the same one with other things, and which of the things something is done with are others.
 
-    What could be confused with the other things is left out of both plans: nobody could say which is meant.
+    Nobody could say which is meant among things of one kind that all look otherwise than before. So they are
+    left out of both plans, or told by colour: by that of the whole thing, if it stays, or by that of one part,
+    while everything else about all of them changes.
 
     Raises:
         Unreachable: if nothing can be another: all act beside one of their kind, or have no other shape.
@@ -46,30 +52,57 @@ def other_instances(
     if not alone:
         raise Unreachable("things of one kind act together")
     changed = {i for i in alone if rng.random() < _CHANGED} or {int(rng.choice(alone))}
-    other = {plan.draws[i]: _other(plan.draws[i], variation, rng) for i in sorted(changed)}
-    kept = [
-        i for i, draw in enumerate(plan.draws) if i < plan.acting or not _confusing(draw, other, variation)
-    ]
-    shown = Plan(tuple(plan.draws[i] for i in kept), tuple(plan.things[i] for i in kept), plan.parts)
-    draws = tuple(other.get(draw, draw) for draw in shown.draws)
+    shown, asked = list(plan.draws), list(plan.draws)
+    kept = set(range(len(shown)))
+    for i in sorted(changed):
+        _change(i, plan, families, variation, rng, shown, asked, kept)
+    order = sorted(kept)
     try:
-        # A thing can be in one scene only.
-        things = tuple(draw.thing(families) for draw in draws)
+        # A thing can be in one scene only, so those of the second are always drawn anew.
+        before, after = (_drawn(plan, [draws[i] for i in order], families) for draws in (shown, asked))
     except Diverged as error:
         raise Unreachable("a thing has no other shape") from error
-    return shown, replace(shown, draws=draws, things=things), frozenset(changed)
+    return before, after, frozenset(changed)
 
 
-def _other(draw: Draw, variation: Variation, rng: np.random.Generator) -> Draw:
-    color, sizes = rng.integers(2**32, size=2).tolist()
-    if variation != "shape":
-        draw = draw._replace(color=color)
-    return draw if variation == "color" else draw._replace(sizes=sizes)
+def _change(
+    i: int,
+    plan: Plan,
+    families: Mapping[str, Family],
+    variation: Variation,
+    rng: np.random.Generator,
+    shown: list[Draw],
+    asked: list[Draw],
+    kept: set[int],
+) -> None:
+    """Make thing `i` another one in what is `asked`, and decide what becomes of those of its kind."""
+    draw = plan.draws[i]
+    color, sizes, mark = rng.integers(2**32, size=3).tolist()
+
+    def other(one: Draw) -> Draw:
+        one = one if variation == "shape" else one._replace(color=color)
+        return one if variation == "color" else one._replace(sizes=sizes)
+
+    around = range(plan.acting, len(shown))
+    equal = [i, *(k for k in around if plan.draws[k] == draw)]
+    rivals = [k for k in around if plan.draws[k].family == draw.family and k not in equal]
+    told = variation != "shape" and rng.random() < _TOLD and telling(families[draw.family], draw.shape)
+    if told:
+        rivals = rivals or [k for k in around if k not in equal][: int(rng.integers(1, 4))]
+    marks = rng.integers(2**32, size=len(rivals)).tolist()
+    for k in equal:
+        shown[k] = draw._replace(mark=mark) if told else draw
+        asked[k] = other(shown[k])
+    alike = rng.random() < _ALIKE
+    for k, own in zip(rivals, marks, strict=True):
+        if told:
+            shown[k] = draw._replace(mark=own)
+            asked[k] = other(shown[k])
+        elif variation != "shape" or shown[k].color == draw.color:
+            kept.discard(k)
+        elif alike and shown[k].shape == draw.shape:
+            asked[k] = other(shown[k])
 
 
-def _confusing(draw: Draw, other: Mapping[Draw, Draw], variation: Variation) -> bool:
-    """Whether a thing is of the kind of one that changes, not its equal, and of no colour that tells."""
-    return draw not in other and any(
-        draw.family == before.family and (variation != "shape" or draw.color == before.color)
-        for before in other
-    )
+def _drawn(plan: Plan, draws: Sequence[Draw], families: Mapping[str, Family]) -> Plan:
+    return Plan(tuple(draws), tuple(draw.thing(families) for draw in draws), plan.parts)

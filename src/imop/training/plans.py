@@ -9,6 +9,7 @@ import numpy as np
 
 from imop.errors import InvalidInput
 from imop.extras import extra
+from imop.training.families.marked import mark, telling
 from imop.training.families.redraw import redrawn
 from imop.training.families.thing import Family, Floor, Thing
 from imop.training.stage import Unreachable
@@ -30,12 +31,14 @@ class Draw(NamedTuple):
         family: its name.
         shape, color: seeds.
         sizes: seed of other sizes for that shape, or None.
+        mark: seed of the colour of a part that tells it from others of its kind, or None.
     """
 
     family: str
     shape: int
     color: int
     sizes: int | None = None
+    mark: int | None = None
 
     def thing(self, families: Mapping[str, Family]) -> Thing:
         """Draw it again.
@@ -45,8 +48,12 @@ class Draw(NamedTuple):
         """
         family = families[self.family]
         if self.sizes is None:
-            return family(np.random.default_rng(self.shape), np.random.default_rng(self.color))
-        return redrawn(family, self.shape, self.color, self.sizes)
+            thing = family(np.random.default_rng(self.shape), np.random.default_rng(self.color))
+        else:
+            thing = redrawn(family, self.shape, self.color, self.sizes)
+        if self.mark is not None:
+            mark(thing, telling(family, self.shape), self.mark)
+        return thing
 
 
 Part = tuple[str, *tuple[int, ...]]
@@ -108,7 +115,7 @@ class _Cast:
 
     def distract(self, number: int, equal: bool) -> None:
         """Add things that resemble one, some of them `equal` to it."""
-        name, shape, color, _ = self.draws[number]
+        name, shape, color, *_ = self.draws[number]
         if self.rng.random() < 0.4:
             self.add(name, shape=shape)
         if self.rng.random() < 0.25:
