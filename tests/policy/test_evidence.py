@@ -6,7 +6,7 @@ import pytest
 from imop.geometry import se3
 from imop.geometry.cloud import concatenate
 from imop.networks.verification import EVIDENCE
-from imop.policy.evidence import Template, glance, palette, pattern, shares
+from imop.policy.evidence import Template, crowd, glance, palette, pattern, shares
 from imop.policy.interfaces import PolicyConfig
 from imop.policy.region import Goal, Region
 from imop.policy.target import OFFSET, Surface, shades
@@ -222,3 +222,14 @@ def test_the_region_stands_for_a_goal_that_is_not_apart():
     found = evidence(box(SIZE, RED), box(SIZE, RED, seed=1))
     for name in ("exact", "loose", "color", "clash", "hidden", "absent"):
         assert found[f"goal_{name}"] == pytest.approx(found[f"near_{name}"])
+
+
+def test_what_stands_where_the_hand_would_be_crowds_it_wherever_that_is():
+    T = se3.make(se3.euler(0.3, 2.9, 0.4), (0.3, 0.1, 0.2))
+    places = np.array(
+        [[0.0, 0.0, -0.15], [0.0, 0.08, -0.08], [0.0, 0.08, -0.07], [0.0, 0.03, -0.03], [0, 0, 0.05]]
+    )
+    points = se3.apply(T, places)
+    found = crowd(points, np.stack([T, se3.make(p=(0.0, 0.0, 0.5)) @ T]))
+    np.testing.assert_allclose(found, np.log1p([[1, 2, 1], [0, 0, 0]]))
+    np.testing.assert_array_equal(crowd(points[:0], T[None]), np.zeros((1, 3)))

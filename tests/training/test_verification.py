@@ -12,7 +12,7 @@ from imop.networks.model import BUNDLED, load_model
 from imop.networks.verification import INPUTS, VerificationConfig, VerificationNetwork
 from imop.policy.learned import LearnedMatcher
 from imop.training import cases
-from imop.training.cases import Cases, make_cases, read_cases, right_goals, write_cases
+from imop.training.cases import Cases, make_cases, off_goals, read_cases, write_cases
 from imop.training.families import TRAINING
 from imop.training.set_up import SetUp
 from imop.training.synthetic import synthetic_scenes
@@ -22,13 +22,13 @@ from imop.training.verification import VerificationTraining, fit, loss
 
 def some(rng, cases=60):
     """Cases in which the candidate with the largest first number is right, if that is large."""
-    inputs, right, case = [], [], []
+    inputs, off, case = [], [], []
     for k in range(cases):
         x = rng.normal(size=(6, INPUTS)).astype(np.float32)
         inputs.append(x)
-        right.append((x[:, 0] == x[:, 0].max()) & (x[:, 0] > 0.3))
+        off.append(np.where((x[:, 0] == x[:, 0].max()) & (x[:, 0] > 0.3), 0.0, 2.0).astype(np.float32))
         case.append(np.full(6, k))
-    return Cases(*(np.concatenate(c) for c in (inputs, right, case)))
+    return Cases(*(np.concatenate(c) for c in (inputs, off, case)))
 
 
 def test_what_decides_is_learned(tmp_path):
@@ -40,25 +40,29 @@ def test_what_decides_is_learned(tmp_path):
 
 
 def test_the_loss_by_hand():
-    logits, right = torch.tensor([0.0, 0.0, 0.0]), torch.tensor([True, False, False])
+    logits, off = torch.tensor([0.0, 0.0, 0.0]), torch.tensor([0.0, 1.5, math.inf])
     # Two candidates of which one is right, and one that is wrong and has nothing to choose from.
-    value = loss(logits, right, torch.tensor([0, 0, 1]))
+    value = loss(logits, off, torch.tensor([0, 0, 1]))
     assert value.item() == pytest.approx(math.log(2) + 0.5 * math.log(2), rel=1e-5)
 
 
+def test_of_two_right_candidates_the_nearer_one_is_to_be_chosen():
+    off, case = torch.tensor([0.1, 0.8]), torch.zeros(2, dtype=torch.long)
+    assert loss(torch.tensor([3.0, 2.0]), off, case) < loss(torch.tensor([2.0, 3.0]), off, case)
+
+
 def test_a_case_counts_once_however_many_candidates_it_has():
-    few = loss(torch.tensor([1.0, -1.0]), torch.tensor([False, False]), torch.tensor([0, 1]))
-    many = loss(
-        torch.tensor([1.0, 1.0, 1.0, -1.0]), torch.zeros(4, dtype=torch.bool), torch.tensor([0, 0, 0, 1])
-    )
+    few = loss(torch.tensor([1.0, -1.0]), torch.full((2,), 2.0), torch.tensor([0, 1]))
+    many = loss(torch.tensor([1.0, 1.0, 1.0, -1.0]), torch.full((4,), 2.0), torch.tensor([0, 0, 0, 1]))
     assert few.item() == pytest.approx(many.item())
 
 
 def test_candidates_near_to_a_right_pose_are_right():
     right = np.stack([np.eye(4), se3.make(se3.euler(z=2.0), (0.3, 0.0, 0.0))])
     near, far, turned = se3.make(p=(0.015, 0, 0)), se3.make(p=(0.025, 0, 0)), se3.make(se3.euler(z=0.2))
-    found = right_goals(np.stack([near, far, right[1], turned]), right)
-    assert found.tolist() == [True, False, True, False]
+    found = off_goals(np.stack([near, far, right[1], turned]), right)
+    np.testing.assert_allclose(found, [0.75, 1.25, 0.0, 0.2 / np.radians(10)], atol=1e-6)
+    assert np.isinf(off_goals(right, right[:0])).all()
 
 
 def test_between_two_turns_of_a_round_thing_everything_is_right():
@@ -75,7 +79,7 @@ def test_between_two_turns_of_a_round_thing_everything_is_right():
     goal = example.pair.T_query_support[0] @ example.pair.T_world_goal
     position, rotation = errors(turn @ goal, right_poses(example))
     assert position < 0.01 and rotation <= np.radians(1.0) + 1e-6
-    assert right_goals(goal[None], right_poses(example)).all()
+    assert off_goals(goal[None], right_poses(example)) < 1
 
 
 def test_cases_are_made_again_written_and_read(tmp_path):
@@ -83,16 +87,16 @@ def test_cases_are_made_again_written_and_read(tmp_path):
     families = {name: TRAINING[name] for name in ("block", "tray")}
     made, again = (make_cases(model, families, (1.0, 0.0, 0.0, 0.0), 3, 1) for _ in range(2))
     for one, other in zip(made, again, strict=True):
-        for (inputs, right), (same, as_right) in zip(one, other, strict=True):
+        for (inputs, off), (same, as_off) in zip(one, other, strict=True):
             np.testing.assert_array_equal(inputs, same)
-            np.testing.assert_array_equal(right, as_right)
+            np.testing.assert_array_equal(off, as_off)
     write_cases(made, tmp_path / "cases-00000.npz")
     write_cases(again, tmp_path / "cases-00001.npz")
     found = read_cases(tmp_path)
     stages = [stage for case in made for stage in case]
-    assert found.inputs.shape == (2 * sum(len(right) for _, right in stages), INPUTS)
+    assert found.inputs.shape == (2 * sum(len(off) for _, off in stages), INPUTS)
     assert found.case.max() + 1 == 2 * len(stages) and (np.diff(found.case) >= 0).all()
-    assert found.right.mean() > 0 and np.isfinite(found.inputs).all()
+    assert (found.off < 1).any() and np.isfinite(found.inputs).all()
 
 
 def test_nothing_is_right_where_its_things_are_not():
@@ -102,12 +106,12 @@ def test_nothing_is_right_where_its_things_are_not():
     other = next(scenes)[0].asked.observations[0]
     matcher = LearnedMatcher(load_model(BUNDLED))
     absent, *present = cases._cases(group, matcher, SetUp(), np.random.default_rng(0), elsewhere=other)
-    assert len(present) == len(group) and any(right.any() for stages in present for _, right in stages)
-    assert absent and not any(right.any() for _, right in absent)
+    assert len(present) == len(group) and any((off < 1).any() for stages in present for _, off in stages)
+    assert absent and not any((off < 1).any() for _, off in absent)
 
 
 def test_as_many_cases_are_made_as_are_asked_for(tmp_path, monkeypatch):
-    case = [(np.zeros((2, INPUTS), np.float32), np.array([True, False]))]
+    case = [(np.zeros((2, INPUTS), np.float32), np.array([0.0, 2.0], np.float32))]
     monkeypatch.setattr(cases, "make_cases", lambda *given: [case] * given[-1])
     monkeypatch.setattr("sys.argv", ["cases", "--out", str(tmp_path), "--cases", "23"])
     cases.main()

@@ -30,6 +30,7 @@ EVIDENCE = (
     *("held", "opens", "opening", "size", "points", "certainty", "spread", "near_spread", "turns", "marks"),
     "palette",
     "apart",
+    *("wrist", "palm", "fingers"),
 )
 """What is known of a candidate on its own."""
 RIVALRY = (

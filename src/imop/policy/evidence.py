@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud, concatenate, farthest_points
+from imop.geometry.cloud import PointCloud, concatenate, farthest_points, inside_box
 from imop.geometry.neighbours import within
 from imop.policy.contacts import SAME
 from imop.policy.interfaces import PolicyConfig
@@ -25,6 +25,14 @@ AROUND = 0.04
 # Colours that agree less than this contradict each other. What their pattern explains is told from noise of
 # this variance.
 CLASH, NOISE = 0.1, 0.02
+# Boxes around wrist, palm and fingers of a parallel gripper: lower and upper corner, gripper frame, metres.
+HAND = np.array(
+    [
+        [[-0.045, -0.045, -0.2], [0.045, 0.045, -0.105]],
+        [[-0.03, -0.1, -0.105], [0.03, 0.1, -0.05]],
+        [[-0.01, -0.05, -0.05], [0.01, 0.05, -0.01]],
+    ]
+)
 
 
 class Template:
@@ -222,6 +230,19 @@ def _backward(template: Template, surface: Surface, T: FloatArray) -> FloatArray
     inside = np.asarray(surface.tree.query_ball_point(at, BESIDE, return_sorted=True), dtype=np.int64)
     there = _explain(beside, surface, _some(inside, template.backward), back).loose
     return np.array([got / all_of_it, color, clash, np.log1p(len(near)), forward.mean(), _mean(there)])
+
+
+def crowd(points: FloatArray, T_world_gripper: FloatArray) -> FloatArray:
+    """(H, 3) how many points (N, 3), on a logarithmic scale, are where wrist, palm and fingers would be.
+
+    Args:
+        points: that stand in the scene, world frame.
+        T_world_gripper: (H, 4, 4).
+    """
+    p_gripper = se3.apply(se3.invert(T_world_gripper), points).reshape(-1, 3)
+    inside = np.stack([inside_box(p_gripper, *box) for box in HAND], axis=1)
+    counts = inside.reshape(len(T_world_gripper), -1, len(HAND)).sum(axis=1)
+    return np.asarray(np.log1p(counts))
 
 
 def _some(index: NDArray[np.int64], count: int) -> NDArray[np.int64]:

@@ -8,11 +8,20 @@ import numpy as np
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, farthest_points
 from imop.geometry.icp import SMALLEST, upright
-from imop.policy.evidence import Template
+from imop.policy.evidence import Template, crowd
 from imop.policy.interfaces import BEGINNING, Candidate, Feasible, PolicyConfig, Progress, Scene, Transition
 from imop.policy.proposals import Asked, equal_turns, half_turn, straightened, upright_motions
 from imop.policy.region import Goal, Region
-from imop.policy.target import BESIDE, Target, around, find_goal, middle, thing_of, without_held
+from imop.policy.target import (
+    BESIDE,
+    Target,
+    around,
+    find_goal,
+    middle,
+    obstacles,
+    thing_of,
+    without_held,
+)
 from imop.policy.verification import Part, Pool, Sought, Verifier
 from imop.types import FloatArray
 
@@ -45,7 +54,11 @@ class StepSearch:
         template = Template(region, T_goal[:3, 3], beside, views, config, payload, goal)
         parts = _parts(region, payload, goal, T_goal[:3, 3], config)
         turns = equal_turns(region.cloud)
-        self.sought, self._ask = Sought(config, step, region, template, parts, turns, verifier), ask
+        crowded = crowd(obstacles(before, region).points, T_goal[None])[0]
+        self.sought = Sought(config, step, region, template, parts, turns, crowded, verifier)
+        self._ask = ask
+        # All of it, what stays in place on another thing, and what is next to the gripper.
+        self._precise = [part for part in parts if part.name in ("region", "firm", "part")]
         self._half_turn = half_turn(thing_of(parts[0].coarse, standing.points))
         # What is around the goal is evidence, too.
         around_goal = np.zeros((0, 3)) if goal is None else goal.cloud.points
@@ -106,7 +119,7 @@ class StepSearch:
         """What was done before goes on."""
         for name, T in (("hint", pool.T_last), ("gripper", pool.T_repeated)):
             if T is not None:
-                pool.add(name, [T, pool.finished(self.sought.parts[0], T)])
+                pool.add(name, [T, *(pool.finished(part, T) for part in self._precise)])
 
     def _fitted(self, pool: Pool) -> None:
         """What most matches agree on."""
@@ -146,7 +159,7 @@ class StepSearch:
         # Which turn of a round thing is meant, its marks may say, or the arm, which cannot reach them all.
         found["turn"] = [pool.moved(whole, T @ S) for T in best[:1] for S in self.sought.turns[1:]]
         for T in best:
-            found["exact"].append(pool.finished(whole, T))
+            found["exact"] += [pool.finished(part, T) for part in self._precise]
             found["upright"].append(upright(T, center))
             straight = straightened(T, pool.T_repeated, center)
             for name, other in (("half_turn", T @ self._half_turn), ("straight", straight)):

@@ -203,6 +203,11 @@ def without_held(cloud: PointCloud, query: Scene, region: Region) -> PointCloud:
     return cloud.select(~within(cloud.points, p_held, SAME))
 
 
+def obstacles(query: Scene, region: Region) -> PointCloud:
+    """What stands in a scene, without what is in the hand, if the region is not what is held; no normals."""
+    return without_held(query.fused.select(~query.ground.bare), query, region)
+
+
 def around(points: FloatArray, thing: FloatArray, motions: FloatArray) -> BoolArray:
     """(N,) which points (N, 3) have to do with a thing (M, 3) after any of the motions (H, 4, 4)."""
     corners = np.stack(np.meshgrid(*np.stack([thing.min(axis=0), thing.max(axis=0)]).T), axis=-1)

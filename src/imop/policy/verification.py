@@ -15,11 +15,11 @@ from imop.geometry import se3
 from imop.geometry.icp import CLOSE, FINEST
 from imop.geometry.ransac import distinct
 from imop.networks.verification import EVIDENCE, RIVALRY, VerificationNetwork
-from imop.policy.evidence import Template, glance, palette, shares
+from imop.policy.evidence import Template, crowd, glance, palette, shares
 from imop.policy.interfaces import Candidate, PolicyConfig, Transition
 from imop.policy.proposals import Asked, Matches
 from imop.policy.region import Region
-from imop.policy.target import REACH, Target
+from imop.policy.target import REACH, Target, obstacles
 from imop.types import BoolArray, FloatArray
 
 # Candidates that take the gripper farther apart than this, metres and radians, are rivals.
@@ -90,6 +90,7 @@ class Sought:
         template: the same, ready to be compared.
         parts: of the region: all of it, what stays in place, then what else is looked for on its own.
         turns: (S, 4, 4) after which the region looks the same.
+        crowd: (3,) of the demonstrated action, see `evidence.crowd`.
         verifier: gives probabilities.
     """
 
@@ -99,6 +100,7 @@ class Sought:
     template: Template
     parts: tuple[Part, ...]
     turns: FloatArray
+    crowd: FloatArray
     verifier: Verifier
 
     @property
@@ -134,6 +136,7 @@ class Pool:
         self._sought, self.target, self.T_last = sought, target, T_last
         self.T_repeated, self.asked = T_repeated, asked
         self._palette = palette(sought.template, target.surface)
+        self._obstacles = obstacles(target.query, sought.region).points
         self.motions: list[FloatArray] = []
         self.generators: list[str] = []
         self._rows: list[FloatArray] = []
@@ -233,7 +236,10 @@ class Pool:
         """(H, |EVIDENCE|) of motions (H, 4, 4); in the order of `networks.verification.EVIDENCE`."""
         sought = self._sought
         first = shares(sought.template, self.target.surface, T)
-        return np.concatenate([first, self._support(T), self._poses(T), self._situation(len(T))], axis=1)
+        others = self._support(T), self._poses(T), self._situation(len(T))
+        # More in the hand's way than was shown.
+        crowded = crowd(self._obstacles, T @ sought.T_goal) - sought.crowd
+        return np.concatenate([first, *others, crowded], axis=1)
 
     def _support(self, T: FloatArray) -> FloatArray:
         """(H, 5) what the matches say, in any of the turns of equal shape."""

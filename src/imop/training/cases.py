@@ -30,7 +30,7 @@ from imop.training.families.thing import Family
 from imop.training.set_up import SetUp
 from imop.training.synthetic import synthetic_executions
 from imop.training.takes import Example, right_poses
-from imop.types import BoolArray, Float32Array, FloatArray, Observation
+from imop.types import Float32Array, FloatArray, Observation
 
 # Share of the later steps that are asked as the first of an episode, too.
 AFRESH = 0.3
@@ -46,6 +46,9 @@ ABSENT = 0.3
 MISPLACED = 0.3
 _PER_FILE = 20
 
+Judged = tuple[Float32Array, Float32Array]
+"""Inputs (H, INPUTS) of candidates, and (H,) how far they are off; see `Cases`."""
+
 
 @dataclass(frozen=True, eq=False)
 class Cases:
@@ -53,21 +56,21 @@ class Cases:
 
     Attributes:
         inputs: (N, INPUTS) of the verification network.
-        right: (N,) whether the candidate is right.
+        off: (N,) how far the candidate is from a right one, in what is still right (`accuracy.COARSE`).
         case: (N,) the number of the case and stage that it belongs to, not decreasing.
     """
 
     inputs: Float32Array
-    right: BoolArray
+    off: Float32Array
     case: NDArray[np.int64]
 
 
 def make_cases(
     model: Model, families: Mapping[str, Family], mix: Sequence[float], seed: int, count: int
-) -> list[list[tuple[Float32Array, BoolArray]]]:
-    """For each of `count` cases, for each stage of the search: inputs (H, INPUTS), (H,) which are right."""
+) -> list[list[Judged]]:
+    """The candidates of each of `count` cases, for each stage of the search."""
     rng = np.random.default_rng((seed, 7))
-    found: list[list[tuple[Float32Array, BoolArray]]] = []
+    found: list[list[Judged]] = []
     matchers = LearnedMatcher(model), RegistrationMatcher(model.verification)
     for group, elsewhere in synthetic_executions(families, mix, seed, rng):
         if len(found) >= count:
@@ -85,7 +88,7 @@ def _cases(
     set_up: SetUp,
     rng: np.random.Generator,
     elsewhere: Observation | None,
-) -> list[list[tuple[Float32Array, BoolArray]]]:
+) -> list[list[Judged]]:
     """The cases of one demonstration and one query, in the order of their steps.
 
     Given how an execution with other things begins, the first step is looked for there, too.
@@ -128,30 +131,34 @@ def _progress(
     return Progress(off @ T)
 
 
-def _judged(pool: Pool, example: Example | None) -> tuple[Float32Array, BoolArray]:
-    """The inputs of a pool's candidates and which of them are right: none without an example."""
+def _judged(pool: Pool, example: Example | None) -> Judged:
+    """A pool's candidates; none is right without an example."""
     goals = pool.goals()
     inputs = beside_rivals(pool.evidence(), goals).astype(np.float32)
-    if example is None:
-        return inputs, np.zeros(len(goals), dtype=bool)
-    return inputs, right_goals(goals, right_poses(example))
+    right = np.zeros((0, 4, 4)) if example is None else right_poses(example)
+    return inputs, off_goals(goals, right).astype(np.float32)
 
 
-def right_goals(goals: FloatArray, right: FloatArray) -> BoolArray:
-    """(H,) which poses (H, 4, 4) are near to one of the right ones (S, 4, 4)."""
+def off_goals(goals: FloatArray, right: FloatArray) -> FloatArray:
+    """(H,) how far poses (H, 4, 4) are from the nearest right one of (S, 4, 4); infinite if there is none.
+
+    Below 1 is what counts as right: 1 is as far away, or turned as much, as `accuracy.COARSE` says.
+    """
     distance, angle = COARSE
-    return np.asarray(se3.near(goals[:, None], right[None], distance, np.radians(angle)).any(axis=1))
+    away = se3.translation_distance(goals[:, None], right[None]) / distance
+    turned = se3.rotation_distance(goals[:, None], right[None]) / np.radians(angle)
+    return np.asarray(np.maximum(away, turned).min(axis=1, initial=np.inf))
 
 
-def write_cases(cases: Sequence[Sequence[tuple[Float32Array, BoolArray]]], path: Path) -> None:
+def write_cases(cases: Sequence[Sequence[Judged]], path: Path) -> None:
     """One file, whole or not at all."""
     stages = [stage for case in cases for stage in case]
-    sizes = [len(right) for _, right in stages]
+    sizes = [len(off) for _, off in stages]
     with replaced(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(
             file,
             inputs=np.concatenate([inputs for inputs, _ in stages]),
-            right=np.concatenate([right for _, right in stages]),
+            off=np.concatenate([off for _, off in stages]),
             case=np.repeat(np.arange(len(stages)), sizes),
         )
 
@@ -161,7 +168,7 @@ def read_cases(*folders: Path) -> Cases:
     parts, start = [], 0
     for path in (path for folder in folders for path in sorted(folder.glob("*.npz"))):
         with np.load(path) as file:
-            parts.append((file["inputs"], file["right"], file["case"] + start))
+            parts.append((file["inputs"], file["off"], file["case"] + start))
             start += int(file["case"].max()) + 1
     return Cases(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 

@@ -41,7 +41,7 @@ def other_instances(
     """The plan and the same one with other things, and which of the things something is done with are others.
 
     Nobody could say which is meant among things of one kind that all look otherwise than before. So they are
-    left out of both plans, or told by colour: by that of the whole thing, if it stays, or by that of one part,
+    left out of both plans, or told by colour: by that of the whole thing, if it stays, or by that of one part
     while everything else about all of them changes.
 
     Raises:

@@ -21,6 +21,8 @@ from imop.networks.verification import VerificationNetwork
 from imop.training.cases import Cases, read_cases
 from imop.types import FloatArray
 
+PRECISE = 3.0
+"""How fast a right candidate is worth less in the choice, the farther it is off."""
 BINS = 10
 """Of equal count, in which probabilities are compared with what came true."""
 
@@ -61,31 +63,35 @@ class _Grouped:
 
     def __init__(self, cases: Cases, which: set[int]) -> None:
         kept = np.isin(cases.case, sorted(which))
-        self.inputs, self.right = torch.from_numpy(cases.inputs[kept]), torch.from_numpy(cases.right[kept])
+        self.inputs, self.off = torch.from_numpy(cases.inputs[kept]), torch.from_numpy(cases.off[kept])
         starts = np.flatnonzero(np.diff(cases.case[kept], prepend=-1))
-        self.ranges = list(zip(starts, [*starts[1:], len(self.right)], strict=True))
+        self.ranges = list(zip(starts, [*starts[1:], len(self.off)], strict=True))
 
     def take(self, which: np.ndarray) -> tuple[Tensor, Tensor, Tensor]:
-        """Inputs, which are right, and the case of each candidate."""
+        """Inputs, how far off, and the case of each candidate."""
         index = np.concatenate([np.arange(*self.ranges[i]) for i in which])
         case = np.repeat(np.arange(len(which)), [self.ranges[i][1] - self.ranges[i][0] for i in which])
-        return self.inputs[index], self.right[index], torch.from_numpy(case)
+        return self.inputs[index], self.off[index], torch.from_numpy(case)
 
 
-def loss(logits: Tensor, right: Tensor, case: Tensor) -> Tensor:
+def loss(logits: Tensor, off: Tensor, case: Tensor) -> Tensor:
     """Cross entropy of each candidate, and of the choice among those of a case; the mean over cases.
+
+    In the choice a right candidate is worth more, the nearer it is: the loss is the negative logarithm of the
+    worth that is expected of a candidate drawn by its probability.
 
     Args:
         logits: (N,).
-        right: (N,) whether the candidate is right.
+        off: (N,) how far the candidate is off; it is right below 1.
         case: (N,) the number of its case, from 0 on.
     """
-    count = int(case.max()) + 1
+    count, right = int(case.max()) + 1, off < 1
     each = F.binary_cross_entropy_with_logits(logits, right.to(logits), reduction="none")
     sizes = torch.bincount(case, minlength=count)
     single = logits.new_zeros(count).index_add(0, case, each) / sizes
     some = torch.zeros(count).index_add(0, case, right.float()) > 0
-    total, good = (_logsumexp(x, case, count) for x in (logits, logits.masked_fill(~right, -1e4)))
+    worth = torch.where(right, logits - PRECISE * off, -1e4)
+    total, good = (_logsumexp(x, case, count) for x in (logits, worth))
     choice = torch.where(some, total - good, 0.0).sum() / some.sum().clamp_min(1)
     return single.mean() + 0.5 * choice
 
@@ -108,11 +114,11 @@ def fit(network: VerificationNetwork, cases: Cases, config: VerificationTraining
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, config.learning_rate, config.steps)
     network.train()
     for _ in range(config.steps):
-        inputs, right, case = train.take(rng.integers(len(train.ranges), size=config.batch))
+        inputs, off, case = train.take(rng.integers(len(train.ranges), size=config.batch))
         dropped = torch.rand_like(inputs) < config.dropout
         inputs = torch.where(dropped, network.standardized.mean, inputs)
         optimizer.zero_grad()
-        torch.autograd.backward(loss(network(inputs), right, case))
+        torch.autograd.backward(loss(network(inputs), off, case))
         optimizer.step()
         schedule.step()
     network.eval()
@@ -124,15 +130,18 @@ def measure(network: VerificationNetwork, cases: _Grouped) -> dict[str, float]:
 
     Returns:
         right: share of cases whose likeliest candidate is right. possible: share with any right one.
+        off: how far the likeliest ones that are right are off, in the mean; 1 is just not right.
         calibration: expected calibration error over ten bins of equal size.
     """
     p = network.probability(cases.inputs).numpy()
     best = [a + int(np.argmax(p[a:b])) for a, b in cases.ranges]
-    hit, sure = cases.right.numpy()[best].astype(float), p[best]
-    possible = [bool(cases.right[a:b].any()) for a, b in cases.ranges]
+    off, sure = cases.off.numpy()[best], p[best]
+    hit = (off < 1).astype(float)
+    possible = [bool((cases.off[a:b] < 1).any()) for a, b in cases.ranges]
     return {
         "right": float(hit.mean()),
         "possible": float(np.mean(possible)),
+        "off": float(off[off < 1].mean()),
         "sure": float(sure.mean()),
         "calibration": calibration_error(sure, hit),
     }

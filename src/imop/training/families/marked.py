@@ -20,7 +20,7 @@ def mark(thing: Thing, geoms: tuple[int, ...], seed: int) -> None:
 
 @lru_cache(maxsize=1000)
 def telling(family: Family, shape: int) -> tuple[int, ...]:
-    """Numbers of the geoms of one colour, which may tell a thing of this shape; none if it has one colour only.
+    """Numbers of the geoms of one colour that may tell a thing of this shape; none if it has one colour only.
 
     Things of the same structure in other sizes have the same numbers.
 
