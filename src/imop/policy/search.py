@@ -117,9 +117,14 @@ class StepSearch:
 
     def _followed(self, pool: Pool) -> None:
         """What was done before goes on."""
-        for name, T in (("hint", pool.T_last), ("gripper", pool.T_repeated)):
-            if T is not None:
-                pool.add(name, [T, *(pool.finished(part, T) for part in self._precise)])
+        goes_on = {"gripper": pool.T_repeated}
+        if pool.T_last is not None:
+            sent, gone = (T @ self.sought.T_goal for T in (pool.T_last, pool.T_repeated))
+            # Mostly the hand went where it was sent, and both are the same.
+            same = se3.near(sent, gone, *self.sought.config.same_motion)
+            goes_on = {"hint": pool.T_last} | ({} if same else goes_on)
+        for name, T in goes_on.items():
+            pool.add(name, [T, *(pool.finished(part, T) for part in self._precise)])
 
     def _fitted(self, pool: Pool) -> None:
         """What most matches agree on."""
