@@ -78,7 +78,8 @@ def loss(logits: Tensor, off: Tensor, case: Tensor) -> Tensor:
     """Cross entropy of each candidate, and of the choice among those of a case; the mean over cases.
 
     In the choice a right candidate is worth more, the nearer it is: the loss is the negative logarithm of the
-    worth that is expected of a candidate drawn by its probability.
+    worth that is expected of a candidate drawn by its probability. The likeliest candidate of each case counts
+    once more on its own: it is the one whose probability is told, and as the largest of many it is too large.
 
     Args:
         logits: (N,).
@@ -93,7 +94,15 @@ def loss(logits: Tensor, off: Tensor, case: Tensor) -> Tensor:
     worth = torch.where(right, logits - PRECISE * off, -1e4)
     total, good = (_logsumexp(x, case, count) for x in (logits, worth))
     choice = torch.where(some, total - good, 0.0).sum() / some.sum().clamp_min(1)
-    return single.mean() + 0.5 * choice
+    return single.mean() + 0.5 * choice + each[_likeliest(logits, case, count)].mean()
+
+
+def _likeliest(logits: Tensor, case: Tensor, count: int) -> Tensor:
+    """(count,) the number of each case's likeliest candidate; those of a case follow each other."""
+    sizes = torch.bincount(case, minlength=count).tolist()
+    starts = torch.tensor([0, *sizes[:-1]]).cumsum(0)
+    chosen = [int(part.argmax()) for part in logits.detach().split(sizes)]
+    return starts + torch.tensor(chosen)
 
 
 def _logsumexp(x: Tensor, case: Tensor, count: int) -> Tensor:
