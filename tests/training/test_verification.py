@@ -9,7 +9,7 @@ import torch
 from imop.geometry import se3
 from imop.geometry.accuracy import errors
 from imop.networks.model import BUNDLED, load_model
-from imop.networks.verification import INPUTS, VerificationConfig, VerificationNetwork
+from imop.networks.verification import EVIDENCE, INPUTS, VerificationConfig, VerificationNetwork
 from imop.policy.learned import LearnedMatcher
 from imop.training import cases
 from imop.training.cases import Cases, make_cases, off_goals, read_cases, write_cases
@@ -21,10 +21,11 @@ from imop.training.verification import VerificationTraining, fit, loss
 
 
 def some(rng, cases=60):
-    """Cases in which the candidate with the largest first number is right, if that is large."""
+    """Cases in which the candidate that explains the region best is right, if it explains much of it."""
     inputs, off, case = [], [], []
     for k in range(cases):
         x = rng.normal(size=(6, INPUTS)).astype(np.float32)
+        x[:, len(EVIDENCE)] = x[:, 0] - x[:, 0].max()
         inputs.append(x)
         off.append(np.where((x[:, 0] == x[:, 0].max()) & (x[:, 0] > 0.3), 0.0, 2.0).astype(np.float32))
         case.append(np.full(6, k))
@@ -43,7 +44,8 @@ def test_the_loss_by_hand():
     logits, off = torch.tensor([0.0, 0.0, 0.0]), torch.tensor([0.0, 1.5, math.inf])
     # Two candidates of which one is right, and one that is wrong and has nothing to choose from.
     value = loss(logits, off, torch.tensor([0, 0, 1]))
-    assert value.item() == pytest.approx(math.log(2) + 0.5 * math.log(2), rel=1e-5)
+    # Each candidate, the choice between the two, and the likeliest of each case.
+    assert value.item() == pytest.approx((1 + 0.5 + 1) * math.log(2), rel=1e-5)
 
 
 def test_of_two_right_candidates_the_nearer_one_is_to_be_chosen():

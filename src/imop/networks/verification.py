@@ -101,8 +101,7 @@ class VerificationNetwork(nn.Module):
         )
         self.shifts = nn.ModuleList(nn.Linear(between, out) for out in (width, width, 1))
         shapes = (width, len(directed)), (width, width), (1, width)
-        # Their softplus is about what a linear layer begins with, in the mean of what is added up.
-        self.weights = nn.ParameterList(torch.randn(shape) * 0.5 - 3.0 for shape in shapes)
+        self.weights = nn.ParameterList(torch.randn(shape) / shape[1] ** 0.5 for shape in shapes)
 
     def forward(self, evidence: Tensor) -> Tensor:
         """Logits (H,) of candidates with evidence (H, INPUTS); NaN where nothing is known."""
@@ -111,7 +110,7 @@ class VerificationNetwork(nn.Module):
         situation, h = self.situation(x[:, self.free]), x[:, self.directed] * self.signs
         for number, (weight, shift) in enumerate(zip(self.weights, self.shifts, strict=True)):
             h = _bent(h) if number else h
-            h = F.linear(h, F.softplus(weight)) + shift(situation)
+            h = F.linear(h, weight.abs()) + shift(situation)
         logits: Tensor = h[:, 0]
         return logits
 

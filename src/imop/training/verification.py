@@ -78,8 +78,8 @@ def loss(logits: Tensor, off: Tensor, case: Tensor) -> Tensor:
     """Cross entropy of each candidate, and of the choice among those of a case; the mean over cases.
 
     In the choice a right candidate is worth more, the nearer it is: the loss is the negative logarithm of the
-    worth that is expected of a candidate drawn by its probability. The likeliest candidate of each case counts
-    once more on its own: it is the one whose probability is told, and as the largest of many it is too large.
+    worth that is expected of a candidate drawn by its probability. The likeliest candidate of each case
+    counts once more on its own: its probability is told, and as the largest of many it would be too large.
 
     Args:
         logits: (N,).
@@ -101,7 +101,7 @@ def _likeliest(logits: Tensor, case: Tensor, count: int) -> Tensor:
     """(count,) the number of each case's likeliest candidate; those of a case follow each other."""
     sizes = torch.bincount(case, minlength=count).tolist()
     starts = torch.tensor([0, *sizes[:-1]]).cumsum(0)
-    chosen = [int(part.argmax()) for part in logits.detach().split(sizes)]
+    chosen = [int(part.argmax()) for part in torch.split(logits.detach(), sizes)]
     return starts + torch.tensor(chosen)
 
 
