@@ -100,6 +100,7 @@ TRAINING: dict[str, Family] = {
     "capped": sided.capped,
     "drum": sided.drum,
     "casket": sided.casket,
+    "painted": sided.painted,
     "composite": composites.composite,
     "mechanism": mechanisms.mechanism,
 }

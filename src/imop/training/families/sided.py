@@ -157,3 +157,33 @@ def casket(shape: np.random.Generator, color: np.random.Generator) -> Thing:
     grips = (Hold(from_front((x + 0.7 * out, at, high - 0.004), shape.uniform(0.2, 0.8)), width=0.008),)
     pokes = (Hold(from_above((x + 0.6 * out, at, high)), width=0.0),)
     return Thing(spec, grips, pokes, spots=(up(0.7 * x, at, z),), sided=True)
+
+
+def painted(shape: np.random.Generator, color: np.random.Generator) -> Thing:
+    """Something round, or of equal sides; paint alone tells its turn: a stripe, pointer, spot or label."""
+    spec, body = part()
+    r, z, sides = shape.uniform(0.018, 0.038), shape.uniform(0.012, 0.08), int(shape.choice((4, 8, 20)))
+    first, second = paint(color), paint(color)
+    mantle = inner(body, "mantle", se3.euler(z=np.pi / sides), (0, 0, 0))
+    lathe.solid(spec, mantle, "mantle", [(r, 0.0), (r, z)], first, PLASTIC, sides)
+    flat, style, top = r * np.cos(np.pi / sides), int(shape.integers(4)), z + 0.0005
+    thin = shape.uniform(0.1, 0.25) * flat
+    if style < 2:
+        box(
+            body,
+            (-0.9 * flat if style == 0 else 0.0, -thin, z - 0.004),
+            (0.9 * flat, thin, top),
+            second,
+            WOOD,
+        )
+    elif style == 2:
+        spot = inner(body, "spot", np.eye(3), (0.6 * flat, 0, 0))
+        cylinder(spot, 0.35 * flat, z - 0.004, top, second, WOOD)
+    else:
+        box(body, (0.7 * flat, -0.4 * flat, 0.2 * z), (flat + 0.0005, 0.4 * flat, 0.8 * z), second, WOOD)
+    grip = from_above((0, 0, max(0.0095, z - 0.02)), yaw=float(shape.choice((0.0, np.pi / 2))))
+    poke = Hold(from_above((0.0 if style == 0 else 0.7 * flat, 0, z)), width=0.0)
+    turns = np.stack([se3.make(se3.euler(z=angle)) for angle in (0.0, np.pi)[: 2 if style == 0 else 1]])
+    return Thing(
+        spec, (Hold(grip, width=2 * flat),), (poke,), (up(0, 0, z),), symmetry=turns, sided=style > 0
+    )
