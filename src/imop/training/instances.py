@@ -52,57 +52,48 @@ def other_instances(
     if not alone:
         raise Unreachable("things of one kind act together")
     changed = {i for i in alone if rng.random() < _CHANGED} or {int(rng.choice(alone))}
-    shown, asked = list(plan.draws), list(plan.draws)
-    kept = set(range(len(shown)))
+    drawn: dict[int, tuple[Draw, Draw] | None] = {k: (draw, draw) for k, draw in enumerate(plan.draws)}
     for i in sorted(changed):
-        _change(i, plan, families, variation, rng, shown, asked, kept)
-    order = sorted(kept)
+        drawn |= _changes(i, plan, families, variation, rng)
     try:
-        # A thing can be in one scene only, so those of the second are always drawn anew.
-        before, after = (_drawn(plan, [draws[i] for i in order], families) for draws in (shown, asked))
+        # A thing can be in one scene only, so all are drawn again for either.
+        shown, asked = (
+            Plan(draws, tuple(draw.thing(families) for draw in draws), plan.parts)
+            for draws in zip(*(both for both in drawn.values() if both is not None), strict=True)
+        )
     except Diverged as error:
         raise Unreachable("a thing has no other shape") from error
-    return before, after, frozenset(changed)
+    return shown, asked, frozenset(changed)
 
 
-def _change(
-    i: int,
-    plan: Plan,
-    families: Mapping[str, Family],
-    variation: Variation,
-    rng: np.random.Generator,
-    shown: list[Draw],
-    asked: list[Draw],
-    kept: set[int],
-) -> None:
-    """Make thing `i` another one in what is `asked`, and decide what becomes of those of its kind."""
+def _changes(
+    i: int, plan: Plan, families: Mapping[str, Family], variation: Variation, rng: np.random.Generator
+) -> dict[int, tuple[Draw, Draw] | None]:
+    """How thing `i` and those like it are drawn in either plan; None for what is left out."""
     draw = plan.draws[i]
     color, sizes, mark = rng.integers(2**32, size=3).tolist()
 
-    def other(one: Draw) -> Draw:
-        one = one if variation == "shape" else one._replace(color=color)
-        return one if variation == "color" else one._replace(sizes=sizes)
+    def both(one: Draw) -> tuple[Draw, Draw]:
+        other = one if variation == "shape" else one._replace(color=color)
+        return one, other if variation == "color" else other._replace(sizes=sizes)
 
-    around = range(plan.acting, len(shown))
+    around = range(plan.acting, len(plan.draws))
     equal = [i, *(k for k in around if plan.draws[k] == draw)]
     rivals = [k for k in around if plan.draws[k].family == draw.family and k not in equal]
     told = variation != "shape" and rng.random() < _TOLD and telling(families[draw.family], draw.shape)
     if told:
         rivals = rivals or [k for k in around if k not in equal][: int(rng.integers(1, 4))]
     marks = rng.integers(2**32, size=len(rivals)).tolist()
-    for k in equal:
-        shown[k] = draw._replace(mark=mark) if told else draw
-        asked[k] = other(shown[k])
     alike = rng.random() < _ALIKE
+    found: dict[int, tuple[Draw, Draw] | None] = {
+        k: both(draw._replace(mark=mark) if told else draw) for k in equal
+    }
     for k, own in zip(rivals, marks, strict=True):
+        rival = plan.draws[k]
         if told:
-            shown[k] = draw._replace(mark=own)
-            asked[k] = other(shown[k])
-        elif variation != "shape" or shown[k].color == draw.color:
-            kept.discard(k)
-        elif alike and shown[k].shape == draw.shape:
-            asked[k] = other(shown[k])
-
-
-def _drawn(plan: Plan, draws: Sequence[Draw], families: Mapping[str, Family]) -> Plan:
-    return Plan(tuple(draws), tuple(draw.thing(families) for draw in draws), plan.parts)
+            found[k] = both(draw._replace(mark=own))
+        elif variation != "shape" or rival.color == draw.color:
+            found[k] = None
+        elif alike and rival.shape == draw.shape:
+            found[k] = both(rival)
+    return found

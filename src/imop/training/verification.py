@@ -150,7 +150,7 @@ def measure(network: VerificationNetwork, cases: _Grouped) -> dict[str, float]:
     return {
         "right": float(hit.mean()),
         "possible": float(np.mean(possible)),
-        "off": float(off[off < 1].mean()),
+        "off": float(off[off < 1].mean()) if hit.any() else 1.0,
         "sure": float(sure.mean()),
         "calibration": calibration_error(sure, hit),
     }
