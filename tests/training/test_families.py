@@ -122,3 +122,11 @@ def test_things_set_down_stand_at_height_zero():
             assert stands(points) and points[:, 2].min() == pytest.approx(0.0)
             stood += 1
     assert stood > 5
+
+
+def test_a_bottle_whose_shoulders_are_high_still_has_a_neck():
+    sizes = [
+        TRAINING["bottle"](np.random.default_rng(shape), np.random.default_rng(0)).part.compile().geom_size
+        for shape in (2546904560, *range(200))
+    ]
+    assert min(size[:, 1].min() for size in sizes) > 0

@@ -35,7 +35,7 @@ def bottle(shape: np.random.Generator, color: np.random.Generator) -> Thing:
     """A turned bottle with a cap; frame: centre of its base."""
     r, h = shape.uniform(0.02, 0.038), shape.uniform(0.11, 0.24)
     neck, shoulder = shape.uniform(0.35, 0.6) * r, shape.uniform(0.45, 0.75) * h
-    top = shoulder + shape.uniform(0.25, 0.6) * (h - shoulder)
+    top = min(shoulder + shape.uniform(0.25, 0.6) * (h - shoulder), h - 0.014)
     spec, body = part(fixed=True)
     glass = paint(color)
     cylinder(body, r, 0, shoulder, glass, PLASTIC)
