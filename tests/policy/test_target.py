@@ -8,7 +8,7 @@ from imop.geometry import se3
 from imop.geometry.cloud import concatenate
 from imop.policy.interfaces import PolicyConfig
 from imop.policy.region import Region
-from imop.policy.target import Target, find_goal, middle, thing_of, without_held
+from imop.policy.target import Target, find_goal, middle, obstacles, thing_of
 from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, camera, scene, transitions
 
 SIZE = (0.1, 0.05, 0.06)
@@ -37,9 +37,11 @@ def test_what_is_in_the_hand_is_left_out_unless_it_is_the_region():
     query = scene([held, other], HOME)
     p_held = se3.apply(se3.invert(HOME), held.points)
     region = Region(other, np.ones(len(other)), p_held)
-    left = without_held(query.cloud, query, region)
-    assert left.points[:, 2].max() < TABLE + 0.05 and len(left) == len(query.cloud) - len(held)
-    assert without_held(query.cloud, query, Region(held, np.ones(len(held)), p_held[:0])) is query.cloud
+    left = query.cloud.select(obstacles(query, region))
+    standing = ~query.ground.bare
+    assert left.points[:, 2].max() < TABLE + 0.05 and len(left) == standing.sum() - len(held)
+    is_held = Region(held, np.ones(len(held)), p_held[:0])
+    np.testing.assert_array_equal(obstacles(query, is_held), standing)
 
 
 def test_target_without_normals_get_them_from_their_own_points():

@@ -26,7 +26,7 @@ def made(variation, families, count, seed=0):
 
 @pytest.fixture(scope="module")
 def shaped():
-    return made("both", LIDS, 30)
+    return made("both", LIDS, 30, seed=1)
 
 
 def test_the_right_motion_carries_the_demonstrated_action_to_that_on_the_other_thing(shaped):
@@ -45,9 +45,8 @@ def test_the_right_motion_carries_the_demonstrated_action_to_that_on_the_other_t
 def test_labels_are_there_for_the_region_only_and_near_zero_somewhere_on_it(shaped):
     for pair in shaped:
         assert not np.isfinite(pair.invariance[~pair.region]).any()
+        assert np.isfinite(pair.invariance[pair.region]).mean() > 0.9
         assert has_invariant_part(pair.invariance)
-    # The rest is noise beside the thing.
-    assert np.mean([np.isfinite(pair.invariance[pair.region]).mean() for pair in shaped]) > 0.9
 
 
 def test_shapes_differ_and_colours_alone_leave_no_label(shaped):

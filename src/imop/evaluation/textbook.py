@@ -14,7 +14,7 @@ from imop.errors import MissingExtra
 from imop.geometry.cloud import PointCloud
 from imop.policy.interfaces import BEGINNING, Candidate, Feasible, PolicyConfig, Progress, Scene, Transition
 from imop.policy.region import Region, find_regions
-from imop.policy.target import without_held
+from imop.policy.target import obstacles
 from imop.types import FloatArray
 
 # Neighbours within `radius` that a descriptor looks at, at most.
@@ -112,7 +112,7 @@ class TextbookStep:
         """Where the region is in the query: one answer, by what is seen alone. See `PreparedStep.locate`."""
         if len(query.cloud) < 5:
             return ()
-        things = without_held(query.cloud.select(~query.ground.bare), query, self._region)
+        things = query.cloud.select(obstacles(query, self._region))
         if len(things) < 5:
             return ()
         _open3d().utility.random.seed(self._matcher.seed)

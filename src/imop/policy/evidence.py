@@ -25,7 +25,8 @@ AROUND = 0.04
 # Colours that agree less than this contradict each other. What their pattern explains is told from noise of
 # this variance.
 CLASH, NOISE = 0.1, 0.02
-# Boxes around wrist, palm and fingers of a parallel gripper: lower and upper corner, gripper frame, metres.
+# Boxes around wrist, palm and fingers of a parallel gripper, after the Panda's: lower and upper corner,
+# gripper frame, metres.
 HAND = np.array(
     [
         [[-0.045, -0.045, -0.2], [0.045, 0.045, -0.105]],

@@ -19,7 +19,7 @@ from imop.policy.interfaces import BEGINNING, Candidate, Feasible, PolicyConfig,
 from imop.policy.proposals import Asked, Matches
 from imop.policy.region import Region, find_regions
 from imop.policy.search import StepSearch
-from imop.policy.target import without_held
+from imop.policy.target import obstacles
 from imop.policy.verification import Verifier
 from imop.types import FloatArray
 
@@ -88,7 +88,7 @@ class RegisteredStep:
 
     def _ask(self, query: Scene) -> Asked:
         """Descriptors that choose each other."""
-        standing = without_held(query.cloud.select(~query.ground.bare), query, self._region)
+        standing = query.cloud.select(obstacles(query, self._region))
         keypoints, descriptors = self._matcher.describe(standing, self._matcher.config.keypoints[1])
         pairs = mutual_matches(self._described, descriptors)
         x, y = self._keypoints.select(pairs.i_support), keypoints.select(pairs.i_query)

@@ -8,20 +8,11 @@ import numpy as np
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, farthest_points
 from imop.geometry.icp import SMALLEST, upright
-from imop.policy.evidence import Template, crowd
+from imop.policy.evidence import Template
 from imop.policy.interfaces import BEGINNING, Candidate, Feasible, PolicyConfig, Progress, Scene, Transition
 from imop.policy.proposals import Asked, equal_turns, half_turn, straightened, upright_motions
 from imop.policy.region import Goal, Region
-from imop.policy.target import (
-    BESIDE,
-    Target,
-    around,
-    find_goal,
-    middle,
-    obstacles,
-    thing_of,
-    without_held,
-)
+from imop.policy.target import BESIDE, Target, around, find_goal, middle, obstacles, thing_of
 from imop.policy.verification import Part, Pool, Sought, Verifier
 from imop.types import FloatArray
 
@@ -54,9 +45,7 @@ class StepSearch:
         template = Template(region, T_goal[:3, 3], beside, views, config, payload, goal)
         parts = _parts(region, payload, goal, T_goal[:3, 3], config)
         turns = equal_turns(region.cloud)
-        crowded = crowd(obstacles(before, region).points, T_goal[None])[0]
-        self.sought = Sought(config, step, region, template, parts, turns, crowded, verifier)
-        self._ask = ask
+        self.sought, self._ask = Sought(config, step, region, template, parts, turns, verifier), ask
         # All of it, what stays in place on another thing, and what is next to the gripper.
         self._precise = [part for part in parts if part.name in ("region", "firm", "part")]
         self._half_turn = half_turn(thing_of(parts[0].coarse, standing.points))
@@ -95,18 +84,18 @@ class StepSearch:
             return
         before, T_last = self.sought.step.before, progress.T_last
         T_repeated = query.observation.T_world_gripper @ se3.invert(before.observation.T_world_gripper)
+        stands = obstacles(query, self.sought.region)
+        standing = query.fused.select(stands)
         if T_last is not None:
-            near = query.fused.select(~query.ground.bare)
-            near = near.select(around(near.points, self._concerned, np.stack([T_last, T_repeated])))
-            near = without_held(near, query, self.sought.region)
+            near = standing.select(around(standing.points, self._concerned, np.stack([T_last, T_repeated])))
             if len(near) >= SMALLEST:
-                pool = Pool(self.sought, Target(query, near), T_last, T_repeated, None)
+                pool = Pool(self.sought, Target(query, near), standing.points, T_last, T_repeated, None)
                 self._followed(pool)
                 yield pool
-        standing = without_held(query.cloud.select(~query.ground.bare), query, self.sought.region)
         if len(standing) < SMALLEST:
             return
-        pool = Pool(self.sought, Target(query, standing), T_last, T_repeated, self._ask(query))
+        target, asked = Target(query, query.cloud.select(stands)), self._ask(query)
+        pool = Pool(self.sought, target, standing.points, T_last, T_repeated, asked)
         self._followed(pool)
         stages = [self._searched, self._anywhere]
         if pool.asked and pool.asked.fits:
@@ -117,14 +106,17 @@ class StepSearch:
 
     def _followed(self, pool: Pool) -> None:
         """What was done before goes on."""
-        goes_on = {"gripper": pool.T_repeated}
-        if pool.T_last is not None:
-            sent, gone = (T @ self.sought.T_goal for T in (pool.T_last, pool.T_repeated))
-            # Mostly the hand went where it was sent, and both are the same.
-            same = se3.near(sent, gone, *self.sought.config.same_motion)
-            goes_on = {"hint": pool.T_last} | ({} if same else goes_on)
-        for name, T in goes_on.items():
-            pool.add(name, [T, *(pool.finished(part, T) for part in self._precise)])
+        T_last, T_goal = pool.T_last, self.sought.T_goal
+        if T_last is not None:
+            pool.add("hint", [T_last, *self._laid(pool, T_last)])
+        # Mostly the hand went where it was sent, and both are the same.
+        gone = pool.T_repeated @ T_goal
+        if T_last is None or not se3.near(T_last @ T_goal, gone, *self.sought.config.same_motion):
+            pool.add("gripper", [pool.T_repeated, *self._laid(pool, pool.T_repeated)])
+
+    def _laid(self, pool: Pool, T: FloatArray) -> list[FloatArray]:
+        """Motions (4, 4) next to `T` that lay what has to fit exactly onto the scene, part by part."""
+        return [pool.finished(part, T) for part in self._precise]
 
     def _fitted(self, pool: Pool) -> None:
         """What most matches agree on."""
@@ -164,7 +156,7 @@ class StepSearch:
         # Which turn of a round thing is meant, its marks may say, or the arm, which cannot reach them all.
         found["turn"] = [pool.moved(whole, T @ S) for T in best[:1] for S in self.sought.turns[1:]]
         for T in best:
-            found["exact"] += [pool.finished(part, T) for part in self._precise]
+            found["exact"] += self._laid(pool, T)
             found["upright"].append(upright(T, center))
             straight = straightened(T, pool.T_repeated, center)
             for name, other in (("half_turn", T @ self._half_turn), ("straight", straight)):

@@ -195,17 +195,13 @@ def find_goal(step: Transition, region: Region, config: PolicyConfig) -> Goal | 
     return Goal(still.select(near), fading(away[near]), thing)
 
 
-def without_held(cloud: PointCloud, query: Scene, region: Region) -> PointCloud:
-    """The part of a query's cloud that is not in the hand, if the region is not what is held."""
-    if not len(region.p_gripper_held):
-        return cloud
-    p_held = se3.apply(query.observation.T_world_gripper, region.p_gripper_held)
-    return cloud.select(~within(cloud.points, p_held, SAME))
-
-
-def obstacles(query: Scene, region: Region) -> PointCloud:
-    """What stands in a scene, without what is in the hand, if the region is not what is held; no normals."""
-    return without_held(query.fused.select(~query.ground.bare), query, region)
+def obstacles(scene: Scene, region: Region) -> BoolArray:
+    """(N,) which points stand in a scene and are not in the hand, if the region is not what is held."""
+    stands = ~scene.ground.bare
+    if len(region.p_gripper_held):
+        p_held = se3.apply(scene.observation.T_world_gripper, region.p_gripper_held)
+        stands &= ~within(scene.fused.points, p_held, SAME)
+    return stands
 
 
 def around(points: FloatArray, thing: FloatArray, motions: FloatArray) -> BoolArray:

@@ -90,7 +90,6 @@ class Sought:
         template: the same, ready to be compared.
         parts: of the region: all of it, what stays in place, then what else is looked for on its own.
         turns: (S, 4, 4) after which the region looks the same.
-        crowd: (3,) of the demonstrated action, see `evidence.crowd`.
         verifier: gives probabilities.
     """
 
@@ -100,7 +99,6 @@ class Sought:
     template: Template
     parts: tuple[Part, ...]
     turns: FloatArray
-    crowd: FloatArray
     verifier: Verifier
 
     @property
@@ -113,6 +111,13 @@ class Sought:
         """(3,) of the region."""
         return np.asarray(self.region.cloud.points.mean(axis=0))
 
+    @cached_property
+    def crowd(self) -> FloatArray:
+        """(3,) of the demonstrated action, see `evidence.crowd`."""
+        before = self.step.before
+        standing = before.fused.points[obstacles(before, self.region)]
+        return np.asarray(crowd(standing, self.T_goal[None])[0])
+
 
 class Pool:
     """Candidates of one step in one scene.
@@ -120,6 +125,7 @@ class Pool:
     Args:
         sought: the step.
         target: what of the scene the region may be.
+        obstacles: (N, 3) all that stands in the scene, but for what is in the hand.
         T_last: (4, 4) the motion of the step before, if there was one.
         T_repeated: (4, 4) what the gripper has done since the demonstration.
         asked: what the matcher says, once it is asked.
@@ -129,6 +135,7 @@ class Pool:
         self,
         sought: Sought,
         target: Target,
+        obstacles: FloatArray,
         T_last: FloatArray | None,
         T_repeated: FloatArray,
         asked: Asked | None,
@@ -136,7 +143,7 @@ class Pool:
         self._sought, self.target, self.T_last = sought, target, T_last
         self.T_repeated, self.asked = T_repeated, asked
         self._palette = palette(sought.template, target.surface)
-        self._obstacles = obstacles(target.query, sought.region).points
+        self._obstacles = obstacles
         self.motions: list[FloatArray] = []
         self.generators: list[str] = []
         self._rows: list[FloatArray] = []

@@ -4,6 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from imop.sim.parts.shapes import rgba
 from imop.training.families.thing import Family, Thing, paint
 
 LEAST = 0.08
@@ -12,10 +13,10 @@ LEAST = 0.08
 
 def mark(thing: Thing, geoms: tuple[int, ...], seed: int) -> None:
     """Paint some geoms of a thing, in place, in the colour that is drawn from `seed`."""
-    color = paint(np.random.default_rng(seed))
+    color = rgba(paint(np.random.default_rng(seed)))
     every = thing.part.geoms
     for number in geoms:
-        every[number].rgba = [*color, 1.0]
+        every[number].rgba = color
 
 
 @lru_cache(maxsize=1000)
