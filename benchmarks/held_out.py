@@ -45,7 +45,7 @@ from imop.training.families import HELD_OUT, TRAINING
 from imop.training.plans import check_kinds
 from imop.training.set_up import SetUp
 from imop.training.synthetic import SAME_ONLY, synthetic_executions
-from imop.training.takes import Example, right_poses
+from imop.training.takes import Example
 from imop.types import FloatArray, Observation
 
 PER_JOB = 10
@@ -180,7 +180,7 @@ def off(found: Sequence[Candidate], example: Example) -> tuple[float | None, flo
     if not found:
         return None, None
     position, rotation = errors(
-        se3.orthonormal(found[0].T_query_support @ example.pair.T_world_goal), right_poses(example)
+        se3.orthonormal(found[0].T_query_support @ example.pair.T_world_goal), example.right_poses()
     )
     return float(position), float(np.degrees(rotation))
 

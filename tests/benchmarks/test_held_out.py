@@ -11,7 +11,6 @@ from benchmarks import held_out
 from imop.errors import InvalidInput
 from imop.networks.model import BUNDLED
 from imop.policy.interfaces import Candidate
-from imop.training.takes import right_poses
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +29,7 @@ def test_the_right_motion_has_no_error_and_another_has_its_own(example):
     lifted = T.copy()
     lifted[2, 3] += 0.03
     assert off([Candidate(lifted, 1.0)], example) == pytest.approx((0.03, 0.0), abs=1e-5)
-    assert off([], example) == (None, None) and len(right_poses(example))
+    assert off([], example) == (None, None) and len(example.right_poses())
 
 
 def test_what_is_not_there_counts_apart():

@@ -6,7 +6,7 @@ import pytest
 from imop.geometry import se3
 from imop.geometry.cloud import concatenate
 from imop.networks.verification import EVIDENCE
-from imop.policy.evidence import Template, crowd, glance, palette, pattern, shares
+from imop.policy.evidence import Template, crowd, glance, painted, palette, pattern, shares
 from imop.policy.interfaces import PolicyConfig
 from imop.policy.region import Goal, Region
 from imop.policy.target import OFFSET, Surface, shades
@@ -175,6 +175,15 @@ def test_marks_tell_a_turn_whatever_their_colours():
     for query in (marked(RED, GREEN), marked(GREEN, BLUE)):
         right, other = (evidence(cloud, moved(query, T), depth=FAR) for T in (np.eye(4), turned))
         assert right["pattern"] > 0.75 > 0.5 > other["pattern"]
+
+
+@pytest.mark.parametrize("yaw", [0.0, 1.0, np.pi])
+def test_paint_tells_a_turn_before_its_colours_are_known(yaw):
+    cloud, query = marked(RED, GREEN), moved(marked(GREEN, BLUE), at(0, 0, 0, yaw=yaw))
+    template = Template(region(cloud), GOAL, cloud, (), PolicyConfig())
+    turns = np.stack([at(0, 0, 0, yaw=yaw), at(0, 0, 0, yaw=yaw + np.pi)])
+    right, other = painted(template, Surface(query, ()), turns)
+    assert right > other + 0.2
 
 
 def test_a_contradiction_of_colours_is_seen_though_most_of_them_agree():

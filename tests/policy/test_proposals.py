@@ -5,7 +5,15 @@ import pytest
 
 from imop.geometry import se3
 from imop.geometry.cloud import concatenate
-from imop.policy.proposals import Matches, equal_turns, half_turn, straightened, upright_motions
+from imop.policy.proposals import (
+    Matches,
+    all_turns,
+    equal_turns,
+    half_turn,
+    onto,
+    straightened,
+    upright_motions,
+)
 from imop.policy.target import Target, middle
 from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, colored, scene
 
@@ -90,6 +98,19 @@ def angles(cloud):
 
 def test_a_can_looks_the_same_in_every_turn():
     assert len(angles(can())) == 8
+
+
+def test_every_turn_of_a_can_leaves_it_where_it_is():
+    cloud = can()
+    turns = all_turns(equal_turns(cloud), TURNS)
+    assert len(turns) == TURNS and onto(cloud.points[::5], cloud.points, turns).min() > 0.8
+    away = np.degrees(se3.rotation_distance(turns, np.eye(4))).round()
+    assert sorted(away) == sorted(min(15.0 * k, 360.0 - 15.0 * k) for k in range(TURNS))
+
+
+def test_what_is_not_round_has_no_other_turns():
+    turns = equal_turns(box((0.06, 0.06, 0.06), RED, HERE))
+    assert all_turns(turns, TURNS) is turns
 
 
 def test_a_cube_looks_the_same_in_four_turns():

@@ -8,12 +8,21 @@ from imop.demos.store import DemonstrationStore
 from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.geometry.neighbours import nearest
-from imop.training.recorded import groups, write_recorded
-from imop.training.recorded_across import other_pairs
-from imop.training.recorded_takes import group_pairs, take
+from imop.training import recorded_across, recorded_takes
+from imop.training.recorded import groups, recorded_executions, write_recorded
+from imop.training.recorded_takes import take
 from imop.training.shards import Shard
 from imop.types import Action, Demonstration, Keyframe
 from tests.demos.scenes import Box, joints_for, observe
+
+
+def group_pairs(takes):
+    return [example.pair for example in recorded_takes.group_pairs(takes)]
+
+
+def other_pairs(first, second):
+    return [example.pair for example in recorded_across.other_pairs(first, second)]
+
 
 DOWN = se3.euler(x=np.pi)
 HOME = se3.make(DOWN, (0.28, 0.0, 1.25))
@@ -160,6 +169,24 @@ def test_the_share_of_pairs_with_other_objects_is_met(store, tmp_path):
     assert write_recorded(store.path, tmp_path / "shards", 8, 0, others=0.5) == 8
     shard = Shard(tmp_path / "shards" / "shard-00000.npz")
     assert sum(shard[i].invariance is not None for i in range(8)) == 4
+
+
+def test_executions_are_whole_and_come_with_how_another_task_begins(store):
+    for number in range(3):
+        store.append(demonstration(number, half=LONGER, instance=4))
+    with pytest.raises(InvalidInput, match="task"):
+        next(recorded_executions(store))
+    store.append(replace(demonstration(0), task="test/other"))
+    found = list(recorded_executions(store, others=0.5))
+    assert len(found) > 6
+    for group, elsewhere in found:
+        assert [example.step for example in group] == [0, 1] and elsewhere.views
+        assert len({(id(example.shown), id(example.asked)) for example in group}) == 1
+        for example in group:
+            to_recorded = se3.translation_distance(example.right_poses(), example.asked.goal(example.step))
+            assert to_recorded.min() < 1e-6
+    across = [g for g, _ in found if g[0].pair.invariance is not None]
+    assert len(across) == pytest.approx(len(found) / 2, abs=1)
 
 
 @pytest.mark.parametrize(("share", "field"), [(0.5, "store"), (1.5, "others"), (float("nan"), "others")])

@@ -161,6 +161,14 @@ def shares(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
     return np.concatenate([rows, backward], axis=1)
 
 
+def painted(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
+    """(H,) how well the paint of the region lies, after motions (H, 4, 4), as it was shown; see `pattern`."""
+    which = np.arange(template.size)
+    found = surface.explain(*template.moved(T, which), *_tiled(template, which, len(T)))
+    loose = found.loose.reshape(len(T), -1) * template.weights[which, 0]
+    return pattern(template.hue[which], surface.shades[found.index].reshape(len(T), -1, 4), loose)
+
+
 def palette(template: Template, surface: Surface) -> float:
     """Share 0 .. 1 of the region's colours that are somewhere in the scene, wherever that is.
 

@@ -9,7 +9,7 @@
 | `matches` | what some matches agree on, by sampled triples, and every turn where most of them lead |
 | `upright` | what was found, set upright |
 | `anywhere` | every turn on every thing |
-| `turn` | what was found, in every turn that leaves the region looking the same |
+| `turn` | what was found, in those turns that leave the shape as it is and fit its paint best |
 | `half_turn` | half a turn after what was found |
 | `straight` | what was found, turned as the gripper was in the demonstration |
 | `exact` | what was found, laid exactly onto what was seen |
@@ -38,6 +38,8 @@ SOME = 0.1
 ALIKE, NEAR = 0.8, 0.006
 # Points that are compared, and how far off the middle of what was seen the axis may be, metres.
 POINTS, OFF = 200, 0.008
+# What looks the same after so many of the turns that are tried is round.
+ROUND = 8
 # The same of a half turn, and how many axes are refined.
 AXES, REFINED = 0.05, 4
 
@@ -146,6 +148,15 @@ def equal_turns(cloud: PointCloud) -> FloatArray:
     if all(np.isclose(angle, np.pi) for angle, _ in found):
         found = []
     return np.stack([np.eye(4), *(T for _, T in found)])
+
+
+def all_turns(turns: FloatArray, count: int) -> FloatArray:
+    """(count, 4, 4) turns about the axis of equal `turns` (S, 4, 4); the same turns if it is not round."""
+    if len(turns) < ROUND:
+        return turns
+    half = turns[np.argmin(turns[:, 0, 0])]
+    axis = np.array([*half[:2, 3] / 2, 0.0])
+    return upright_motions(axis, axis[None], count)
 
 
 def half_turn(points: FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ from imop.geometry.cloud import PointCloud, farthest_points
 from imop.geometry.icp import SMALLEST, upright
 from imop.policy.evidence import Template
 from imop.policy.interfaces import BEGINNING, Candidate, Feasible, PolicyConfig, Progress, Scene, Transition
-from imop.policy.proposals import Asked, equal_turns, half_turn, straightened, upright_motions
+from imop.policy.proposals import Asked, all_turns, equal_turns, half_turn, straightened, upright_motions
 from imop.policy.region import Goal, Region
 from imop.policy.target import BESIDE, Target, around, find_goal, middle, obstacles, thing_of
 from imop.policy.verification import Part, Pool, Sought, Verifier
@@ -48,6 +48,7 @@ class StepSearch:
         self.sought, self._ask = Sought(config, step, region, template, parts, turns, verifier), ask
         # All of it, what stays in place on another thing, and what is next to the gripper.
         self._precise = [part for part in parts if part.name in ("region", "firm", "part")]
+        self._turns = all_turns(turns, config.turns)
         self._half_turn = half_turn(thing_of(parts[0].coarse, standing.points))
         # What is around the goal is evidence, too.
         around_goal = np.zeros((0, 3)) if goal is None else goal.cloud.points
@@ -154,7 +155,9 @@ class StepSearch:
         found: dict[str, list[FloatArray]] = {"half_turn": [], "straight": [], "upright": [], "exact": []}
         best = pool.best(self.sought.config.tried)
         # Which turn of a round thing is meant, its marks may say, or the arm, which cannot reach them all.
-        found["turn"] = [pool.moved(whole, T @ S) for T in best[:1] for S in self.sought.turns[1:]]
+        for T in best[:1] if len(self._turns) > 1 else ():
+            turned = np.concatenate([pool.as_painted(T @ self._turns), T @ self.sought.turns[1:]])
+            found["turn"] = [pool.moved(whole, motion) for motion in turned]
         for T in best:
             found["exact"] += self._laid(pool, T)
             found["upright"].append(upright(T, center))

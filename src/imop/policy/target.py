@@ -20,7 +20,7 @@ from imop.policy.region import NEXT, Goal, Region, fading
 from imop.types import BoolArray, CameraView, Float32Array, FloatArray
 
 # Farthest counterpart, metres.
-REACH = 0.03
+REACH = 0.06
 # Standard deviations of what is explained exactly: off the counterpart's tangent plane and along it, metres.
 OFFSET, ALONG = 0.005, 0.008
 # Standard deviation of the difference of two shades of one colour; see `shades`.

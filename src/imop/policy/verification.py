@@ -15,7 +15,7 @@ from imop.geometry import se3
 from imop.geometry.icp import CLOSE, FINEST
 from imop.geometry.ransac import distinct
 from imop.networks.verification import EVIDENCE, RIVALRY, VerificationNetwork
-from imop.policy.evidence import Template, crowd, glance, palette, shares
+from imop.policy.evidence import Template, crowd, glance, painted, palette, shares
 from imop.policy.interfaces import Candidate, PolicyConfig, Transition
 from imop.policy.proposals import Asked, Matches
 from imop.policy.region import Region
@@ -168,6 +168,11 @@ class Pool:
             chosen |= {int(order[i]) for i in distinct(seeds[order], center, config.refined)}
         name = name or ("matches" if part.name == "region" else part.name)
         self.add(name, [self.moved(part, seeds[i]) for i in sorted(chosen)])
+
+    def as_painted(self, T: FloatArray) -> FloatArray:
+        """The few of motions (H, 4, 4) after which colours lie most as they were shown, whatever they are."""
+        fits = painted(self._sought.template, self.target.surface, T)
+        return T[np.argsort(-fits, kind="stable")[: self._sought.config.tried]]
 
     def add(self, name: str, motions: Sequence[FloatArray]) -> None:
         """Judge motions that differ from all before; the most promising ones, if there are too many."""

@@ -1,14 +1,16 @@
 """What the verification network is trained on: candidates of the search itself, and which of them are right.
 
 python -m imop.training.cases --out DIR --cases N --seed S [--weights FOLDER] [--jobs J] [--mix ...]
+python -m imop.training.cases --out DIR --cases N --seed S --store BASE.zarr --others 0.7
 
-A case is one step of a procedural demonstration and one scene in which it has to be done. The networks find
-its region, the search proposes motions stage by stage, and the known poses say which of them take the gripper
-to where it may go. In some set-ups the cameras are not quite where they are said to be, and some scenes are
-others, in which nothing of what was shown is there and no candidate is right.
+A case is one step of a demonstration, procedural or recorded, and one scene in which it has to be done. The
+networks find its region, the search proposes motions stage by stage, and the known poses (of recorded things
+the recorded actions) say which of them take the gripper to where it may go. In some set-ups the cameras are
+not quite where they are said to be, and some scenes are others, in which nothing of what was shown is there
+and no candidate is right.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +19,7 @@ import tyro
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
+from imop.demos.store import DemonstrationStore
 from imop.files import replaced
 from imop.geometry import se3
 from imop.geometry.accuracy import COARSE
@@ -26,10 +29,10 @@ from imop.policy.learned import LearnedMatcher
 from imop.policy.registration import RegistrationMatcher
 from imop.policy.verification import Pool, beside_rivals
 from imop.training.families import TRAINING
-from imop.training.families.thing import Family
+from imop.training.recorded import recorded_executions
 from imop.training.set_up import SetUp
 from imop.training.synthetic import synthetic_executions
-from imop.training.takes import Example, right_poses
+from imop.training.takes import Executed
 from imop.types import Float32Array, FloatArray, Observation
 
 # Share of the later steps that are asked as the first of an episode, too.
@@ -48,6 +51,8 @@ _PER_FILE = 20
 
 Judged = tuple[Float32Array, Float32Array]
 """Inputs (H, INPUTS) of candidates, and (H,) how far they are off; see `Cases`."""
+Execution = tuple[Sequence[Executed], Observation | None]
+"""The steps of one demonstration and query, and how an execution with other things begins, or None."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,13 +71,12 @@ class Cases:
 
 
 def make_cases(
-    model: Model, families: Mapping[str, Family], mix: Sequence[float], seed: int, count: int
+    model: Model, executions: Iterable[Execution], rng: np.random.Generator, count: int
 ) -> list[list[Judged]]:
-    """The candidates of each of `count` cases, for each stage of the search."""
-    rng = np.random.default_rng((seed, 7))
+    """The candidates of each of `count` cases, for each stage of the search; fewer if the executions end."""
     found: list[list[Judged]] = []
     matchers = LearnedMatcher(model), RegistrationMatcher(model.verification)
-    for group, elsewhere in synthetic_executions(families, mix, seed, rng):
+    for group, elsewhere in executions:
         if len(found) >= count:
             break
         matcher = matchers[int(rng.random() < REGISTERED)]
@@ -83,7 +87,7 @@ def make_cases(
 
 
 def _cases(
-    group: Sequence[Example],
+    group: Sequence[Executed],
     matcher: LearnedMatcher | RegistrationMatcher,
     set_up: SetUp,
     rng: np.random.Generator,
@@ -111,7 +115,7 @@ def _cases(
 
 
 def _progress(
-    example: Example, group: Sequence[Example], answers: Mapping[int, FloatArray], rng: np.random.Generator
+    example: Executed, group: Sequence[Executed], answers: Mapping[int, FloatArray], rng: np.random.Generator
 ) -> Progress:
     """What was done before: what the search answered then, right or wrong, or about what was right.
 
@@ -131,11 +135,11 @@ def _progress(
     return Progress(off @ T)
 
 
-def _judged(pool: Pool, example: Example | None) -> Judged:
+def _judged(pool: Pool, example: Executed | None) -> Judged:
     """A pool's candidates; none is right without an example."""
     goals = pool.goals()
     inputs = beside_rivals(pool.evidence(), goals).astype(np.float32)
-    right = np.zeros((0, 4, 4)) if example is None else right_poses(example)
+    right = np.zeros((0, 4, 4)) if example is None else example.right_poses()
     return inputs, off_goals(goals, right).astype(np.float32)
 
 
@@ -183,6 +187,8 @@ class CasesConfig:
         seed: of everything that is drawn.
         weights: folder of the networks that search.
         mix: shares of cases with the same things, others in colour, in shape, in both.
+        store: of recorded demonstrations that the cases are of, instead of procedural ones.
+        others: share of those whose query shows other objects than the demonstration.
         jobs: processes.
     """
 
@@ -191,7 +197,15 @@ class CasesConfig:
     seed: int = 0
     weights: Path = BUNDLED
     mix: tuple[float, float, float, float] = (0.35, 0.1, 0.25, 0.3)
+    store: Path | None = None
+    others: float = 0.0
     jobs: int = 1
+
+
+def _executions(config: CasesConfig, seed: int, rng: np.random.Generator) -> Iterator[Execution]:
+    if config.store is None:
+        return synthetic_executions(TRAINING, config.mix, seed, rng)
+    return recorded_executions(DemonstrationStore.open(config.store), seed, config.others)
 
 
 def _file(config: CasesConfig, number: int) -> None:
@@ -199,7 +213,8 @@ def _file(config: CasesConfig, number: int) -> None:
     if not path.exists():
         content = int(np.random.SeedSequence([config.seed, number]).generate_state(1)[0])
         size = min(_PER_FILE, config.cases - number * _PER_FILE)
-        made = make_cases(load_model(config.weights), TRAINING, config.mix, content, size)
+        rng = np.random.default_rng((content, 7))
+        made = make_cases(load_model(config.weights), _executions(config, content, rng), rng, size)
         write_cases(made, path)
         print(path, flush=True)
 

@@ -6,8 +6,9 @@ Nobody annotates anything: regions come from Eq. (3), right motions from the rec
 import argparse
 from collections import defaultdict
 from collections.abc import Iterator
-from itertools import zip_longest
+from itertools import chain, zip_longest
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,9 +18,12 @@ from imop.errors import InvalidInput
 from imop.robots.panda import panda_self_filter
 from imop.training.pairs import StepPair
 from imop.training.recorded_across import other_pairs
-from imop.training.recorded_takes import Take, group_pairs, take
+from imop.training.recorded_takes import Example, Take, group_pairs, take
 from imop.training.shards import write_shard
+from imop.training.takes import executions
+from imop.types import Observation
 
+T = TypeVar("T")
 SHARD = 500
 MOST = 6
 """Demonstrations that are paired with each other; more of the same make several groups."""
@@ -49,6 +53,35 @@ def recorded_pairs(store: DemonstrationStore, seed: int = 0, others: float = 0.0
     Raises:
         InvalidInput: if the share is none, or no demonstrations belong together in the way that is asked for.
     """
+    same, other = (chain.from_iterable(stream) for stream in _streams(store, seed, others))
+    return (example.pair for example in _shared(same, other, others))
+
+
+def recorded_executions(
+    store: DemonstrationStore, seed: int = 0, others: float = 0.0
+) -> Iterator[tuple[list[Example], Observation]]:
+    """The steps of each demonstration and query, in their order; with each, how another task begins.
+
+    Args: as of `recorded_pairs`.
+
+    Raises:
+        InvalidInput: as `recorded_pairs`, or if the store has one task only.
+    """
+    first = {number: key[0] for key, numbers in by_aim(store).items() for number in numbers}
+    if len(set(first.values())) < 2:
+        raise InvalidInput("store", "has demonstrations of one task only", "of two tasks or more")
+    rng = np.random.default_rng((seed, 1))
+    same, other = (chain.from_iterable(map(executions, stream)) for stream in _streams(store, seed, others))
+    for group in _shared(same, other, others):
+        task = group[0].shown.demonstration.task
+        elsewhere = [number for number, name in first.items() if name != task]
+        yield group, store[int(rng.choice(elsewhere))].keyframes[0].observation
+
+
+def _streams(
+    store: DemonstrationStore, seed: int, others: float
+) -> tuple[Iterator[list[Example]], Iterator[list[Example]]]:
+    """All examples of group after group, and of couple after couple."""
     if not 0 <= others <= 1:
         raise InvalidInput("others", f"{others}", "a share, 0 to 1")
     found = groups(store, seed)
@@ -59,15 +92,19 @@ def recorded_pairs(store: DemonstrationStore, seed: int = 0, others: float = 0.0
     if others and not couples:
         accepted = "two or more sets of objects of the same task and variation, each in several scenes"
         raise InvalidInput("store", f"no two of the {len(found)} groups are of the same task", accepted)
-    streams = (_same(store, found), _others(store, couples))
-    made = [0, 0]
+    return _same(store, found), _others(store, couples)
+
+
+def _shared(same: Iterator[T], other: Iterator[T], others: float) -> Iterator[T]:
+    """Of both in their shares, until what is due next is used up."""
+    streams, made = (same, other), [0, 0]
     while True:
         due = int(others * (sum(made) + 1) - made[1] > (1 - others) * (sum(made) + 1) - made[0])
-        pair = next(streams[due], None)
-        if pair is None:
+        item = next(streams[due], None)
+        if item is None:
             return
         made[due] += 1
-        yield pair
+        yield item
 
 
 def _couples(store: DemonstrationStore, found: list[list[int]]) -> list[tuple[list[int], list[int]]]:
@@ -84,14 +121,14 @@ def _couples(store: DemonstrationStore, found: list[list[int]]) -> list[tuple[li
     return couples
 
 
-def _same(store: DemonstrationStore, found: list[list[int]]) -> Iterator[StepPair]:
+def _same(store: DemonstrationStore, found: list[list[int]]) -> Iterator[list[Example]]:
     for group in found:
-        yield from group_pairs(_takes(store, group))
+        yield group_pairs(_takes(store, group))
 
 
-def _others(store: DemonstrationStore, couples: list[tuple[list[int], list[int]]]) -> Iterator[StepPair]:
+def _others(store: DemonstrationStore, couples: list[tuple[list[int], list[int]]]) -> Iterator[list[Example]]:
     for first, second in couples:
-        yield from other_pairs(_takes(store, first), _takes(store, second))
+        yield other_pairs(_takes(store, first), _takes(store, second))
 
 
 def _takes(store: DemonstrationStore, group: list[int]) -> list[Take]:

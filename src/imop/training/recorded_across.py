@@ -11,13 +11,12 @@ import numpy as np
 
 from imop.geometry import se3
 from imop.training.invariance import INVARIANT, distances, has_invariant_part
-from imop.training.pairs import StepPair
-from imop.training.recorded_takes import Take, region_names, step_pair, visible
+from imop.training.recorded_takes import Example, Take, region_names, step_pair, visible
 from imop.training.symmetry import Scene, Surface, equal_motions
 from imop.types import FloatArray
 
 
-def other_pairs(first: Sequence[Take], second: Sequence[Take]) -> list[StepPair]:
+def other_pairs(first: Sequence[Take], second: Sequence[Take]) -> list[Example]:
     """Pairs of takes of two sets of objects, one take of each at a time: every step, in both directions.
 
     Steps whose region is hidden or another one, or where nothing stays in place, give none.
@@ -38,8 +37,8 @@ def _shared(first: Sequence[Take], second: Sequence[Take], step: int) -> tuple[s
     return tuple(name for name in one if name in other) if agreed else ()
 
 
-def _pairs(shown: Sequence[Take], asked: Sequence[Take], step: int, names: Sequence[str]) -> list[StepPair]:
-    scenes = [Scene(t.full[step], t.observation(step)) for t in asked]
+def _pairs(shown: Sequence[Take], asked: Sequence[Take], step: int, names: Sequence[str]) -> list[Example]:
+    scenes = [Scene(t.full[step], t.observations[step]) for t in asked]
     surface = Surface.pooled((t.part(step, names), t.goal(step)) for t in asked)
     found = []
     for support, query, scene in zip(shown, asked, scenes, strict=False):
@@ -50,7 +49,7 @@ def _pairs(shown: Sequence[Take], asked: Sequence[Take], step: int, names: Seque
         pair = step_pair(support, query, step, names, within @ goal @ se3.invert(support.goal(step)))
         label = _label(support, asked, scenes, step, names)
         if has_invariant_part(label):
-            found.append(replace(pair, invariance=label))
+            found.append(Example(replace(pair, invariance=label), support, query, step))
     return found
 
 

@@ -16,7 +16,7 @@ from imop.training.invariance import INVARIANT
 from imop.training.pairs import StepPair, next_carry
 from imop.training.stage import STORED
 from imop.training.symmetry import Scene, Surface, equal_motions
-from imop.types import BoolArray, Demonstration, FloatArray, Observation
+from imop.types import Action, BoolArray, Demonstration, FloatArray, Observation
 
 OPEN = 0.9
 """A gripper is open from here on, as a policy sees it."""
@@ -39,6 +39,16 @@ class Take:
     clouds: tuple[PointCloud, ...]
     segments: tuple[SegmentedState, ...]
 
+    @property
+    def observations(self) -> tuple[Observation, ...]:
+        """What was seen before each step, and after the last."""
+        return *(k.observation for k in self.demonstration.keyframes), self.demonstration.final
+
+    @property
+    def actions(self) -> list[Action]:
+        """What was done in each step."""
+        return [k.action for k in self.demonstration.keyframes]
+
     def goal(self, step: int) -> FloatArray:
         """T_world_goal (4, 4) of a step."""
         return self.demonstration.keyframes[step].action.T_world_gripper
@@ -47,19 +57,36 @@ class Take:
         """T_world_goal (4, 4) of the steps after one."""
         return [self.goal(s) for s in range(step + 1, len(self.demonstration))]
 
-    def observation(self, step: int) -> Observation:
-        """What was seen before a step."""
-        return self.demonstration.keyframes[step].observation
-
     def part(self, step: int, names: Sequence[str]) -> PointCloud:
         """What is seen of these instances before a step."""
         return self.full[step].select(self.shows(self.full[step], step, names))
 
     def shows(self, cloud: PointCloud, step: int, names: Sequence[str]) -> BoolArray:
         """(N,) True for the points of a cloud of that step that belong to these instances."""
-        known = self.observation(step).instance_names
+        known = self.observations[step].instance_names
         assert known is not None and cloud.ids is not None
         return np.isin(cloud.ids, [i for i, name in known.items() if name in names])
+
+
+@dataclass(frozen=True, eq=False)
+class Example:
+    """A pair, and the takes that it comes from.
+
+    Attributes:
+        pair: of a step.
+        shown: the demonstration.
+        asked: the one that the query is of.
+        step: its number.
+    """
+
+    pair: StepPair
+    shown: Take
+    asked: Take
+    step: int
+
+    def right_poses(self) -> FloatArray:
+        """(S, 4, 4) where the gripper may go in the query."""
+        return self.pair.T_query_support @ self.pair.T_world_goal
 
 
 def take(demonstration: Demonstration, robot_mask: RobotMask | None) -> Take:
@@ -75,7 +102,7 @@ def take(demonstration: Demonstration, robot_mask: RobotMask | None) -> Take:
     return Take(demonstration, full, tuple(thin(cloud, STORED)[0] for cloud in full), segments)
 
 
-def group_pairs(takes: Sequence[Take]) -> list[StepPair]:
+def group_pairs(takes: Sequence[Take]) -> list[Example]:
     """All pairs of takes of the same task, variation and objects: every step, in both directions.
 
     Steps whose region is hidden, or where nothing stays in place in the partners, give none.
@@ -83,7 +110,7 @@ def group_pairs(takes: Sequence[Take]) -> list[StepPair]:
     found = []
     steps = min((len(t.demonstration) for t in takes), default=0)
     for step in range(steps):
-        scenes = {id(t): Scene(t.full[step], t.observation(step)) for t in takes}
+        scenes = {id(t): Scene(t.full[step], t.observations[step]) for t in takes}
         for support in takes:
             names = region_names(support, takes, step)
             if not names:
@@ -92,7 +119,8 @@ def group_pairs(takes: Sequence[Take]) -> list[StepPair]:
             for query in takes:
                 if query is not support and visible(support, query, step, names):
                     asked = scenes[id(query)], support.goal(step), query.goal(step), query.later(step)
-                    found.append(step_pair(support, query, step, names, equal_motions(surface, *asked)))
+                    pair = step_pair(support, query, step, names, equal_motions(surface, *asked))
+                    found.append(Example(pair, support, query, step))
     return found
 
 

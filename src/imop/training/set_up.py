@@ -10,8 +10,8 @@ from imop.geometry.view_alignment import corrected, find_errors
 from imop.policy.interfaces import Scene, Transition
 from imop.robots.panda import panda_self_filter
 from imop.sim.sensing import calibration_error
-from imop.training.takes import Take
-from imop.types import Action, FloatArray, Observation
+from imop.training.takes import Seen
+from imop.types import FloatArray, Observation
 
 # How far misplaced cameras are off, metres and radians.
 WRONG = (0.003, 0.009)
@@ -31,7 +31,7 @@ class SetUp:
     errors: dict[str, FloatArray] = field(default_factory=dict)
 
     @classmethod
-    def misplaced(cls, shown: Take, rng: np.random.Generator) -> "SetUp":
+    def misplaced(cls, shown: Seen, rng: np.random.Generator) -> "SetUp":
         """A set-up in which a demonstration was given and every camera is off."""
         told = {name: calibration_error(rng, *WRONG) for name in shown.observations[0].views}
         return cls(told, find_errors([corrected(o, told) for o in shown.observations]))
@@ -41,10 +41,7 @@ class SetUp:
         seen = corrected(corrected(observation.stripped(), self.T_camera_told), self.errors)
         return Scene(seen, _PERCEPTION.points(seen))
 
-    def transitions(self, take: Take) -> list[Transition]:
+    def transitions(self, shown: Seen) -> list[Transition]:
         """The steps of a demonstration."""
-        scenes = [self.see(observation) for observation in take.observations]
-        return [
-            Transition(scenes[k], scenes[k + 1], Action(state.T_world_gripper, state.gripper_open))
-            for k, state in enumerate(take.states[1:])
-        ]
+        scenes = [self.see(observation) for observation in shown.observations]
+        return [Transition(scenes[k], scenes[k + 1], action) for k, action in enumerate(shown.actions)]

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from imop.training.families.thing import Thing, revolution
 from imop.training.pairs import StepPair, next_carry
 from imop.training.scenes import Scene, demonstrate
 from imop.training.stage import State
-from imop.types import FloatArray, Observation
+from imop.types import Action, FloatArray, Observation
 
 _SAME_PLACE, _SAME_TURN = 0.002, np.radians(1.0)
 _FEWEST_REGION, _FEWEST_QUERY = 12, 10
@@ -37,6 +38,11 @@ class Take:
     clouds: tuple[PointCloud, ...]
     poses: tuple[Poses, ...]
 
+    @property
+    def actions(self) -> list[Action]:
+        """What was done in each step."""
+        return [Action(state.T_world_gripper, state.gripper_open) for state in self.states[1:]]
+
 
 @dataclass(frozen=True, eq=False)
 class Example:
@@ -56,24 +62,68 @@ class Example:
     step: int
     scene: Scene
 
+    def right_poses(self) -> FloatArray:
+        """(S, 4, 4) where the gripper may go in the query; every 2 degrees around a surface of revolution."""
+        goals = self.pair.T_query_support @ self.pair.T_world_goal
+        thing, link = reference(self.scene, self.step)
+        if link != "body" or not is_round(self.scene.stage.things[thing]):
+            return goals
+        T_world_thing = self.asked.poses[self.step][thing, link]
+        turned = T_world_thing @ revolution(180) @ se3.invert(T_world_thing)
+        return (turned[:, None] @ goals).reshape(-1, 4, 4)
 
-def executions(examples: Sequence[Example]) -> list[list[Example]]:
+
+class Seen(Protocol):
+    """A demonstration, recorded or made."""
+
+    @property
+    def observations(self) -> Sequence[Observation]:
+        """Before the first step, and after each."""
+        ...
+
+    @property
+    def actions(self) -> Sequence[Action]:
+        """What was done in each step."""
+        ...
+
+
+class Executed(Protocol):
+    """A step of a demonstration that has to be done in the state of another one; see `Example`."""
+
+    @property
+    def pair(self) -> StepPair:
+        """Of the step."""
+        ...
+
+    @property
+    def shown(self) -> Seen:
+        """The demonstration."""
+        ...
+
+    @property
+    def asked(self) -> Seen:
+        """The execution that the query is of."""
+        ...
+
+    @property
+    def step(self) -> int:
+        """Its number."""
+        ...
+
+    def right_poses(self) -> FloatArray:
+        """(S, 4, 4) where the gripper may go in the query."""
+        ...
+
+
+E = TypeVar("E", bound=Executed)
+
+
+def executions(examples: Sequence[E]) -> list[list[E]]:
     """The examples of a scene by demonstration and query, in the order of their steps."""
-    groups: dict[tuple[int, int], list[Example]] = {}
+    groups: dict[tuple[int, int], list[E]] = {}
     for example in examples:
         groups.setdefault((id(example.shown), id(example.asked)), []).append(example)
     return list(groups.values())
-
-
-def right_poses(example: Example) -> FloatArray:
-    """(S, 4, 4) where the gripper may go in the query; every 2 degrees around a surface of revolution."""
-    goals = example.pair.T_query_support @ example.pair.T_world_goal
-    thing, link = reference(example.scene, example.step)
-    if link != "body" or not is_round(example.scene.stage.things[thing]):
-        return goals
-    T_world_thing = example.asked.poses[example.step][thing, link]
-    turned = T_world_thing @ revolution(180) @ se3.invert(T_world_thing)
-    return (turned[:, None] @ goals).reshape(-1, 4, 4)
 
 
 def take(scene: Scene, rng: np.random.Generator) -> Take:
