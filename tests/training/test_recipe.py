@@ -101,7 +101,10 @@ def test_the_networks_are_trained_and_searched_with_as_planned():
     assert found["first_cases"].weights == found["verification"].weights == found["merged"].out
     assert found["cases"].weights == found["first_verification"].out
     assert found["cases"].mix == found["first_cases"].mix == small.mix
-    assert found["verification"].cases == (found["first_cases"].out, found["cases"].out)
+    assert found["recorded_cases"].weights == found["first_verification"].out
+    assert found["recorded_cases"].store == OUT / "demonstrations.zarr"
+    made = ("first_cases", "cases", "recorded_cases")
+    assert found["verification"].cases == tuple(found[name].out for name in made)
 
 
 def test_a_folder_belongs_to_one_recipe(tmp_path, monkeypatch):

@@ -174,8 +174,7 @@ def test_the_share_of_pairs_with_other_objects_is_met(store, tmp_path):
 def test_executions_are_whole_and_come_with_how_another_task_begins(store):
     for number in range(3):
         store.append(demonstration(number, half=LONGER, instance=4))
-    with pytest.raises(InvalidInput, match="task"):
-        next(recorded_executions(store))
+    assert next(recorded_executions(store))[1] is None, "the store has one task only"
     store.append(replace(demonstration(0), task="test/other"))
     found = list(recorded_executions(store, others=0.5))
     assert len(found) > 6

@@ -34,8 +34,9 @@ class Recipe:
         routes: synthetic routes.
         validation_routes: routes for the validation.
         tasks: of the suite's split base that are recorded; all if none.
-        demonstrations: of each of these tasks; three in a row show the same objects.
+        demonstrations: of each variation of these tasks; three in a row show the same objects.
         recorded: pairs from the demonstrations, at most.
+        others: share of these pairs, and of the cases of demonstrations, with other objects.
         shares: how often training draws a synthetic and a recorded pair.
         batch: pairs per step, of all processes together.
         steps: of region and matching.
@@ -44,6 +45,7 @@ class Recipe:
         every: steps between validations and checkpoints.
         first_cases: cases that are searched with an untrained verification, for a first one.
         cases: cases that are searched with the first verification.
+        recorded_cases: the same of the demonstrations, at most.
         verification_steps: of each verification.
     """
 
@@ -55,6 +57,7 @@ class Recipe:
     tasks: tuple[str, ...]
     demonstrations: int
     recorded: int
+    others: float
     shares: tuple[float, float]
     batch: int
     steps: int
@@ -63,6 +66,7 @@ class Recipe:
     every: int
     first_cases: int
     cases: int
+    recorded_cases: int
     verification_steps: int
 
 
@@ -74,8 +78,9 @@ RECIPES: dict[RecipeName, Recipe] = {
         routes=400,
         validation_routes=60,
         tasks=(),
-        demonstrations=36,
-        recorded=1_500,
+        demonstrations=6,
+        recorded=4_000,
+        others=0.8,
         shares=(0.9, 0.1),
         batch=16,
         steps=10_000,
@@ -84,6 +89,7 @@ RECIPES: dict[RecipeName, Recipe] = {
         every=250,
         first_cases=400,
         cases=3_600,
+        recorded_cases=1_200,
         verification_steps=4_000,
     ),
     "trial": Recipe(
@@ -93,8 +99,9 @@ RECIPES: dict[RecipeName, Recipe] = {
         routes=2,
         validation_routes=1,
         tasks=("open_drawer",),
-        demonstrations=3,
+        demonstrations=6,
         recorded=4,
+        others=0.8,
         shares=(0.9, 0.1),
         batch=2,
         steps=2,
@@ -103,6 +110,7 @@ RECIPES: dict[RecipeName, Recipe] = {
         every=2,
         first_cases=2,
         cases=2,
+        recorded_cases=2,
         verification_steps=20,
     ),
 }
@@ -140,14 +148,14 @@ def stages(recipe: Recipe, out: Path, jobs: int) -> list[Stage]:
             "demonstrations",
             "demonstrations.json",
             f"-m imop.cli collect --out {o}/demonstrations.zarr --split base{tasks}"
-            f" --episodes {r.demonstrations} --scenes 3 --in-turn --seed 50 --jobs {jobs}",
+            f" --episodes {r.demonstrations} --scenes 3 --seed 50 --jobs {jobs}",
             codes=(0, 1),  # 1 if the expert gave up some of the scenes; the others will do.
         ),
         Stage(
             "recorded",
             "shards/recorded",
             f"-m imop.training.recorded --store {o}/demonstrations.zarr --out {o}/shards/recorded"
-            f" --pairs {r.recorded} --seed 60",
+            f" --pairs {r.recorded} --others {r.others} --seed 60",
         ),
         Stage(
             "region_and_matching",
@@ -188,9 +196,15 @@ def stages(recipe: Recipe, out: Path, jobs: int) -> list[Stage]:
             f"{search}/second --cases {r.cases} --weights {o}/networks/first --seed 110",
         ),
         Stage(
+            "recorded_cases",
+            "cases/recorded",
+            f"{search}/recorded --cases {r.recorded_cases} --weights {o}/networks/first --seed 130"
+            f" --store {o}/demonstrations.zarr --others {r.others}",
+        ),
+        Stage(
             "verification",
             "card.json",
-            f"{verify} --cases {o}/cases/first {o}/cases/second --out {o} --seed 120",
+            f"{verify} --cases {o}/cases/first {o}/cases/second {o}/cases/recorded --out {o} --seed 120",
         ),
     ]
 

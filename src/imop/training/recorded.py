@@ -59,23 +59,23 @@ def recorded_pairs(store: DemonstrationStore, seed: int = 0, others: float = 0.0
 
 def recorded_executions(
     store: DemonstrationStore, seed: int = 0, others: float = 0.0
-) -> Iterator[tuple[list[Example], Observation]]:
+) -> Iterator[tuple[list[Example], Observation | None]]:
     """The steps of each demonstration and query, in their order; with each, how another task begins.
 
     Args: as of `recorded_pairs`.
 
     Raises:
-        InvalidInput: as `recorded_pairs`, or if the store has one task only.
+        InvalidInput: as `recorded_pairs`.
     """
     first = {number: key[0] for key, numbers in by_aim(store).items() for number in numbers}
-    if len(set(first.values())) < 2:
-        raise InvalidInput("store", "has demonstrations of one task only", "of two tasks or more")
     rng = np.random.default_rng((seed, 1))
-    same, other = (chain.from_iterable(map(executions, stream)) for stream in _streams(store, seed, others))
+    streams = _streams(store, seed, others)
+    same, other = (chain.from_iterable(map(executions, examples)) for examples in streams)
     for group in _shared(same, other, others):
         task = group[0].shown.demonstration.task
         elsewhere = [number for number, name in first.items() if name != task]
-        yield group, store[int(rng.choice(elsewhere))].keyframes[0].observation
+        begins = store[int(rng.choice(elsewhere))].keyframes[0].observation if elsewhere else None
+        yield group, begins
 
 
 def _streams(
