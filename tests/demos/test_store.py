@@ -49,6 +49,9 @@ def test_round_trip(store):
     assert_same(reopened[0], lift_a_cube())
     assert_same(reopened[-1], lift_a_cube().stripped())
     assert [d.task for d in reopened] == ["test/lift", ""]
+    lift = lift_a_cube()
+    assert reopened.aims()[0] == (lift.task, lift.variation, lift.seeds["instance"])
+    assert reopened.aims()[1] == ("", reopened[1].variation, -1)
     for outside in (2, -3):
         with pytest.raises(IndexError):
             reopened[outside]

@@ -154,7 +154,7 @@ def store(tmp_path):
 
 
 def test_groups_have_the_same_task_variation_and_objects(store):
-    assert [sorted(group) for group in groups(store, 0)] == [[0, 1, 2]]
+    assert [sorted(group) for group in groups(store.aims(), 0)] == [[0, 1, 2]]
 
 
 def test_shards_are_written_as_training_reads_them(store, tmp_path):

@@ -16,10 +16,10 @@ from imop.errors import InvalidInput
 from imop.geometry import cloud as clouds
 from imop.geometry import se3
 from imop.geometry.perception import WORKSPACE_LOWER, WORKSPACE_UPPER
-from imop.types import Demonstration, FloatArray, Keyframe
+from imop.types import FloatArray, Keyframe
 
 Aim = tuple[str, int, int]
-"""Task, variation, and seed of the objects."""
+"""Task, variation, and seed of the objects (-1 if it is not known); see `DemonstrationStore.aims`."""
 
 BACKGROUND = ("floor", "wall", "table", "panda")
 """Instances that are never a region: the robot itself, and what stands still whatever is done."""
@@ -64,11 +64,11 @@ class Region:
     displacement: dict[str, float]
 
 
-def by_aim(demonstrations: Iterable[Demonstration]) -> dict[Aim, list[int]]:
-    """Which of the demonstrations show the same task, variation and objects (-1 if nobody says which)."""
+def by_aim(aims: Iterable[Aim]) -> dict[Aim, list[int]]:
+    """Which demonstrations, by their number, show the same task, variation and objects."""
     found: dict[Aim, list[int]] = defaultdict(list)
-    for number, d in enumerate(demonstrations):
-        found[d.task, d.variation, d.seeds.get("instance", -1)].append(number)
+    for number, aim in enumerate(aims):
+        found[aim].append(number)
     return found
 
 

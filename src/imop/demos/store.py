@@ -118,6 +118,15 @@ class DemonstrationStore:
         """
         return {episode.digest(self._verified(index)[0]) for index in range(len(self))}
 
+    def aims(self) -> list[tuple[str, int, int]]:
+        """Task, variation, and seed of the objects (-1 if it is not known) of every episode, without images.
+
+        Raises:
+            CorruptData: if the description of an episode is damaged.
+        """
+        described = (self._verified(index)[0] for index in range(len(self)))
+        return [(d["task"], d["variation"], d["seeds"].get("instance", -1)) for d in described]
+
     def append(self, demonstration: Demonstration) -> int:
         """Write `demonstration` behind the others; also removes what writers that died have left.
 

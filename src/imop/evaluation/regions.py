@@ -60,7 +60,7 @@ def _objects(observation: Observation) -> PointCloud:
 
 def draw(store: DemonstrationStore, out: Path, count: int) -> list[Path]:
     """Write NAME-VARIATION-OBJECTS.png for the first `count` sets of demonstrations that belong together."""
-    together = [(aim, numbers) for aim, numbers in by_aim(store).items() if len(numbers) > 1]
+    together = [(aim, numbers) for aim, numbers in by_aim(store.aims()).items() if len(numbers) > 1]
     out.mkdir(parents=True, exist_ok=True)
     written = []
     for (task, variation, instance), numbers in together[:count]:

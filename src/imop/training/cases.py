@@ -205,7 +205,7 @@ class CasesConfig:
 def _executions(config: CasesConfig, seed: int, rng: np.random.Generator) -> Iterator[Execution]:
     if config.store is None:
         return synthetic_executions(TRAINING, config.mix, seed, rng)
-    return recorded_executions(DemonstrationStore.open(config.store), seed, config.others)
+    return recorded_executions(DemonstrationStore.open(config.store, verify=False), seed, config.others)
 
 
 def _file(config: CasesConfig, number: int) -> None:

@@ -5,14 +5,14 @@ Nobody annotates anything: regions come from Eq. (3), right motions from the rec
 
 import argparse
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import chain, zip_longest
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 
-from imop.demos.regions import by_aim
+from imop.demos.regions import Aim, by_aim
 from imop.demos.store import DemonstrationStore
 from imop.errors import InvalidInput
 from imop.robots.panda import panda_self_filter
@@ -29,9 +29,9 @@ MOST = 6
 """Demonstrations that are paired with each other; more of the same make several groups."""
 
 
-def groups(store: DemonstrationStore, seed: int) -> list[list[int]]:
+def groups(aims: Sequence[Aim], seed: int) -> list[list[int]]:
     """Numbers of demonstrations that show the same, in random order, with the tasks in turn."""
-    same = by_aim(store)
+    same = by_aim(aims)
     rng = np.random.default_rng(seed)
     by_task: dict[str, list[list[int]]] = defaultdict(list)
     keys = list(same)
@@ -53,7 +53,7 @@ def recorded_pairs(store: DemonstrationStore, seed: int = 0, others: float = 0.0
     Raises:
         InvalidInput: if the share is none, or no demonstrations belong together in the way that is asked for.
     """
-    same, other = (chain.from_iterable(stream) for stream in _streams(store, seed, others))
+    same, other = (chain.from_iterable(stream) for stream in _streams(store, store.aims(), seed, others))
     return (example.pair for example in _shared(same, other, others))
 
 
@@ -67,28 +67,28 @@ def recorded_executions(
     Raises:
         InvalidInput: as `recorded_pairs`.
     """
-    first = {number: key[0] for key, numbers in by_aim(store).items() for number in numbers}
+    aims = store.aims()
     rng = np.random.default_rng((seed, 1))
-    streams = _streams(store, seed, others)
+    streams = _streams(store, aims, seed, others)
     same, other = (chain.from_iterable(map(executions, examples)) for examples in streams)
     for group in _shared(same, other, others):
         task = group[0].shown.demonstration.task
-        elsewhere = [number for number, name in first.items() if name != task]
+        elsewhere = [number for number, aim in enumerate(aims) if aim[0] != task]
         begins = store[int(rng.choice(elsewhere))].keyframes[0].observation if elsewhere else None
         yield group, begins
 
 
 def _streams(
-    store: DemonstrationStore, seed: int, others: float
+    store: DemonstrationStore, aims: Sequence[Aim], seed: int, others: float
 ) -> tuple[Iterator[list[Example]], Iterator[list[Example]]]:
     """All examples of group after group, and of couple after couple."""
     if not 0 <= others <= 1:
         raise InvalidInput("others", f"{others}", "a share, 0 to 1")
-    found = groups(store, seed)
+    found = groups(aims, seed)
     if not found:
         accepted = "two or more of the same task, variation and objects: imop collect --scenes 3"
         raise InvalidInput("store", f"no two of the {len(store)} demonstrations belong together", accepted)
-    couples = _couples(store, found)
+    couples = _couples(aims, found)
     if others and not couples:
         accepted = "two or more sets of objects of the same task and variation, each in several scenes"
         raise InvalidInput("store", f"no two of the {len(found)} groups are of the same task", accepted)
@@ -107,15 +107,14 @@ def _shared(same: Iterator[T], other: Iterator[T], others: float) -> Iterator[T]
         yield item
 
 
-def _couples(store: DemonstrationStore, found: list[list[int]]) -> list[tuple[list[int], list[int]]]:
+def _couples(aims: Sequence[Aim], found: list[list[int]]) -> list[tuple[list[int], list[int]]]:
     """Every group with the one before of the same task and variation, if that has other objects."""
-    aim = {number: key for key, numbers in by_aim(store).items() for number in numbers}
     last: dict[tuple[str, int], list[int]] = {}
     couples = []
     for group in found:
-        task, variation, instance = aim[group[0]]
+        task, variation, instance = aims[group[0]]
         before = last.get((task, variation))
-        if before is not None and aim[before[0]][2] != instance:
+        if before is not None and aims[before[0]][2] != instance:
             couples.append((before, group))
         last[task, variation] = group
     return couples
