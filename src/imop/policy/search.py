@@ -16,6 +16,9 @@ from imop.policy.target import BESIDE, Target, around, find_goal, middle, obstac
 from imop.policy.verification import Part, Pool, Sought, Verifier
 from imop.types import FloatArray
 
+# So many times finer turns are tried where paint tells the turn of something round: closest points do not.
+FINER = 3
+
 
 class StepSearch:
     """A demonstrated step, searched in any number of scenes.
@@ -48,7 +51,7 @@ class StepSearch:
         self.sought, self._ask = Sought(config, step, region, template, parts, turns, verifier), ask
         # All of it, what stays in place on another thing, and what is next to the gripper.
         self._precise = [part for part in parts if part.name in ("region", "firm", "part")]
-        self._turns = all_turns(turns, config.turns)
+        self._turns = all_turns(turns, FINER * config.turns)
         self._half_turn = half_turn(thing_of(parts[0].coarse, standing.points))
         # What is around the goal is evidence, too.
         around_goal = np.zeros((0, 3)) if goal is None else goal.cloud.points
@@ -155,9 +158,12 @@ class StepSearch:
         found: dict[str, list[FloatArray]] = {"half_turn": [], "straight": [], "upright": [], "exact": []}
         best = pool.best(self.sought.config.tried)
         # Which turn of a round thing is meant, its marks may say, or the arm, which cannot reach them all.
+        finer = FINER if len(self._turns) > len(self.sought.turns) else 1
         for T in best[:1] if len(self._turns) > 1 else ():
-            turned = np.concatenate([pool.as_painted(T @ self._turns), T @ self.sought.turns[1:]])
-            found["turn"] = [pool.moved(whole, motion) for motion in turned]
+            found["turn"] = [
+                pool.finished(whole, motion) for motion in pool.as_painted(T @ self._turns, finer)
+            ]
+            found["turn"] += [pool.moved(whole, T @ S) for S in self.sought.turns[1:]]
         for T in best:
             found["exact"] += self._laid(pool, T)
             found["upright"].append(upright(T, center))
