@@ -158,11 +158,8 @@ class StepSearch:
         found: dict[str, list[FloatArray]] = {"half_turn": [], "straight": [], "upright": [], "exact": []}
         best = pool.best(self.sought.config.tried)
         # Which turn of a round thing is meant, its marks may say, or the arm, which cannot reach them all.
-        finer = FINER if len(self._turns) > len(self.sought.turns) else 1
         for T in best[:1] if len(self._turns) > 1 else ():
-            found["turn"] = [
-                pool.finished(whole, motion) for motion in pool.as_painted(T @ self._turns, finer)
-            ]
+            found["turn"] = [pool.finished(whole, motion) for motion in pool.as_painted(T @ self._turns)]
             found["turn"] += [pool.moved(whole, T @ S) for S in self.sought.turns[1:]]
         for T in best:
             found["exact"] += self._laid(pool, T)

@@ -169,20 +169,17 @@ class Pool:
         name = name or ("matches" if part.name == "region" else part.name)
         self.add(name, [self.moved(part, seeds[i]) for i in sorted(chosen)])
 
-    def as_painted(self, T: FloatArray, finer: int) -> FloatArray:
-        """The few of turned motions (H, 4, 4) after which colours lie most as they were shown.
+    def as_painted(self, T: FloatArray) -> FloatArray:
+        """Those few of motions (H, 4, 4), each a small turn after the one before, that fit the paint best.
 
-        Whatever the colours are now. Every `finer`-th motion is looked at, then those around the best ones.
+        That is after which colours lie most as they were shown, whatever they are now. Neighbours of a better
+        one are left out.
         """
-        template, surface = self._sought.template, self.target.surface
-        fits = np.full(len(T), -np.inf)
-        fits[::finer] = painted(template, surface, T[::finer])
-        best = np.argsort(-fits, kind="stable")[: self._sought.config.tried]
-        around = (best[:, None] + np.arange(1 - finer, finer)) % len(T)
-        others = np.setdiff1d(around, np.arange(0, len(T), finer))
-        fits[others] = painted(template, surface, T[others]) if len(others) else 0.0
-        chosen: FloatArray = T[np.unique(around[np.arange(len(best)), fits[around].argmax(axis=1)])]
-        return chosen
+        fits = painted(self._sought.template, self.target.surface, T)
+        beside = np.stack([np.roll(fits, k) for k in (-2, -1, 1, 2)])
+        peaks = np.flatnonzero(fits >= beside.max(axis=0))
+        order = np.argsort(-fits[peaks], kind="stable")
+        return np.asarray(T[peaks[order][: self._sought.config.tried]])
 
     def add(self, name: str, motions: Sequence[FloatArray]) -> None:
         """Judge motions that differ from all before; the most promising ones, if there are too many."""
