@@ -16,9 +16,6 @@ from imop.policy.target import BESIDE, Target, around, find_goal, middle, obstac
 from imop.policy.verification import Part, Pool, Sought, Verifier
 from imop.types import FloatArray
 
-# So many times finer turns are tried where paint tells the turn of something round: closest points do not.
-FINER = 3
-
 
 class StepSearch:
     """A demonstrated step, searched in any number of scenes.
@@ -51,7 +48,7 @@ class StepSearch:
         self.sought, self._ask = Sought(config, step, region, template, parts, turns, verifier), ask
         # All of it, what stays in place on another thing, and what is next to the gripper.
         self._precise = [part for part in parts if part.name in ("region", "firm", "part")]
-        self._turns = all_turns(turns, FINER * config.turns)
+        self._turns = all_turns(turns, config.painted)
         self._half_turn = half_turn(thing_of(parts[0].coarse, standing.points))
         # What is around the goal is evidence, too.
         around_goal = np.zeros((0, 3)) if goal is None else goal.cloud.points
