@@ -145,5 +145,12 @@ def test_without_partners_or_segmentation_there_is_no_region():
 
 
 def test_demonstrations_belong_together_by_task_variation_and_objects():
-    lift, other, larger = ("test/lift", 2, 7), ("test/lift", 0, 7), ("test/lift", 2, 8)
-    assert by_aim([lift, other, larger, lift]) == {lift: [0, 3], other: [1], larger: [2]}
+    one = ("test/lift", 2, 7)
+    shown = [one, ("test/lift", 0, 7), ("test/lift", 2, 8), one, ("test/lift", 2, -1)]
+    found = by_aim(shown)
+    assert found == {
+        ("test/lift", 2, 7): [0, 3],
+        ("test/lift", 0, 7): [1],
+        ("test/lift", 2, 8): [2],
+        ("test/lift", 2, -1): [4],
+    }

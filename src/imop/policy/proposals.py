@@ -38,10 +38,10 @@ SOME = 0.1
 ALIKE, NEAR = 0.8, 0.006
 # Points that are compared, and how far off the middle of what was seen the axis may be, metres.
 POINTS, OFF = 200, 0.008
-# What looks the same after so many of the turns that are tried is round.
-ROUND = 8
 # The same of a half turn, and how many axes are refined.
 AXES, REFINED = 0.05, 4
+# What looks the same after all of the eight turns that are tried is round.
+ROUND = 8
 
 
 @dataclass(frozen=True, eq=False)

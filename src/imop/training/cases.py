@@ -32,7 +32,7 @@ from imop.training.families import TRAINING
 from imop.training.recorded import recorded_executions
 from imop.training.set_up import SetUp
 from imop.training.synthetic import synthetic_executions
-from imop.training.takes import Executed
+from imop.training.takes import Executed, Seen
 from imop.types import Float32Array, FloatArray, Observation
 
 # Share of the later steps that are asked as the first of an episode, too.
@@ -51,7 +51,7 @@ _PER_FILE = 20
 
 Judged = tuple[Float32Array, Float32Array]
 """Inputs (H, INPUTS) of candidates, and (H,) how far they are off; see `Cases`."""
-Execution = tuple[Sequence[Executed], Observation | None]
+Execution = tuple[Sequence[Executed[Seen]], Observation | None]
 """The steps of one demonstration and query, and how an execution with other things begins, or None."""
 
 
@@ -87,7 +87,7 @@ def make_cases(
 
 
 def _cases(
-    group: Sequence[Executed],
+    group: Sequence[Executed[Seen]],
     matcher: LearnedMatcher | RegistrationMatcher,
     set_up: SetUp,
     rng: np.random.Generator,
@@ -115,7 +115,10 @@ def _cases(
 
 
 def _progress(
-    example: Executed, group: Sequence[Executed], answers: Mapping[int, FloatArray], rng: np.random.Generator
+    example: Executed[Seen],
+    group: Sequence[Executed[Seen]],
+    answers: Mapping[int, FloatArray],
+    rng: np.random.Generator,
 ) -> Progress:
     """What was done before: what the search answered then, right or wrong, or about what was right.
 
@@ -135,7 +138,7 @@ def _progress(
     return Progress(off @ T)
 
 
-def _judged(pool: Pool, example: Executed | None) -> Judged:
+def _judged(pool: Pool, example: Executed[Seen] | None) -> Judged:
     """A pool's candidates; none is right without an example."""
     goals = pool.goals()
     inputs = beside_rivals(pool.evidence(), goals).astype(np.float32)

@@ -16,6 +16,7 @@ from imop.training.invariance import INVARIANT
 from imop.training.pairs import StepPair, next_carry
 from imop.training.stage import STORED
 from imop.training.symmetry import Scene, Surface, equal_motions
+from imop.training.takes import Executed
 from imop.types import Action, BoolArray, Demonstration, FloatArray, Observation
 
 OPEN = 0.9
@@ -68,25 +69,8 @@ class Take:
         return np.isin(cloud.ids, [i for i, name in known.items() if name in names])
 
 
-@dataclass(frozen=True, eq=False)
-class Example:
-    """A pair, and the takes that it comes from.
-
-    Attributes:
-        pair: of a step.
-        shown: the demonstration.
-        asked: the one that the query is of.
-        step: its number.
-    """
-
-    pair: StepPair
-    shown: Take
-    asked: Take
-    step: int
-
-    def right_poses(self) -> FloatArray:
-        """(S, 4, 4) where the gripper may go in the query."""
-        return self.pair.T_query_support @ self.pair.T_world_goal
+Example = Executed[Take]
+"""A pair, and the takes that it comes from."""
 
 
 def take(demonstration: Demonstration, robot_mask: RobotMask | None) -> Take:

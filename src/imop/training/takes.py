@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,47 @@ _SAME_PLACE, _SAME_TURN = 0.002, np.radians(1.0)
 _FEWEST_REGION, _FEWEST_QUERY = 12, 10
 
 Poses = dict[tuple[int, str], FloatArray]
+
+
+class Seen(Protocol):
+    """A demonstration, recorded or made."""
+
+    @property
+    def observations(self) -> Sequence[Observation]:
+        """Before the first step, and after each."""
+        ...
+
+    @property
+    def actions(self) -> Sequence[Action]:
+        """What was done in each step."""
+        ...
+
+
+S = TypeVar("S", bound=Seen, covariant=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Executed(Generic[S]):
+    """A step of a demonstration that has to be done in the state of another one.
+
+    Attributes:
+        pair: of the step.
+        shown: the demonstration.
+        asked: the execution that the query is of.
+        step: its number.
+    """
+
+    pair: StepPair
+    shown: S
+    asked: S
+    step: int
+
+    def right_poses(self) -> FloatArray:
+        """(S, 4, 4) where the gripper may go in the query."""
+        return self.pair.T_query_support @ self.pair.T_world_goal
+
+
+E = TypeVar("E", bound=Executed[Seen])
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,77 +86,24 @@ class Take:
 
 
 @dataclass(frozen=True, eq=False)
-class Example:
-    """A pair, and the takes that it comes from.
+class Example(Executed[Take]):
+    """The same of procedural takes.
 
     Attributes:
-        pair: of a step.
-        shown: the demonstration.
-        asked: the execution that the query is of.
-        step: its number.
         scene: of the query.
     """
 
-    pair: StepPair
-    shown: Take
-    asked: Take
-    step: int
     scene: Scene
 
     def right_poses(self) -> FloatArray:
         """(S, 4, 4) where the gripper may go in the query; every 2 degrees around a surface of revolution."""
-        goals = self.pair.T_query_support @ self.pair.T_world_goal
+        goals = super().right_poses()
         thing, link = reference(self.scene, self.step)
         if link != "body" or not is_round(self.scene.stage.things[thing]):
             return goals
         T_world_thing = self.asked.poses[self.step][thing, link]
         turned = T_world_thing @ revolution(180) @ se3.invert(T_world_thing)
         return (turned[:, None] @ goals).reshape(-1, 4, 4)
-
-
-class Seen(Protocol):
-    """A demonstration, recorded or made."""
-
-    @property
-    def observations(self) -> Sequence[Observation]:
-        """Before the first step, and after each."""
-        ...
-
-    @property
-    def actions(self) -> Sequence[Action]:
-        """What was done in each step."""
-        ...
-
-
-class Executed(Protocol):
-    """A step of a demonstration that has to be done in the state of another one; see `Example`."""
-
-    @property
-    def pair(self) -> StepPair:
-        """Of the step."""
-        ...
-
-    @property
-    def shown(self) -> Seen:
-        """The demonstration."""
-        ...
-
-    @property
-    def asked(self) -> Seen:
-        """The execution that the query is of."""
-        ...
-
-    @property
-    def step(self) -> int:
-        """Its number."""
-        ...
-
-    def right_poses(self) -> FloatArray:
-        """(S, 4, 4) where the gripper may go in the query."""
-        ...
-
-
-E = TypeVar("E", bound=Executed)
 
 
 def executions(examples: Sequence[E]) -> list[list[E]]:
