@@ -11,6 +11,7 @@ from imop.geometry.accuracy import errors
 from imop.networks.model import BUNDLED, load_model
 from imop.networks.verification import EVIDENCE, INPUTS, VerificationConfig, VerificationNetwork
 from imop.policy.learned import LearnedMatcher
+from imop.policy.verification import beside_rivals
 from imop.training import cases
 from imop.training.cases import Cases, make_cases, off_goals, read_cases, write_cases
 from imop.training.families import TRAINING
@@ -93,16 +94,18 @@ def test_cases_are_made_again_written_and_read(tmp_path):
         for rng in rngs
     )
     for one, other in zip(made, again, strict=True):
-        for (inputs, off), (same, as_off) in zip(one, other, strict=True):
-            np.testing.assert_array_equal(inputs, same)
-            np.testing.assert_array_equal(off, as_off)
+        for judged, same in zip(one, other, strict=True):
+            for values, as_values in zip(judged, same, strict=True):
+                np.testing.assert_array_equal(values, as_values)
     write_cases(made, tmp_path / "cases-00000.npz")
     write_cases(again, tmp_path / "cases-00001.npz")
     found = read_cases(tmp_path)
     stages = [stage for case in made for stage in case]
-    assert found.inputs.shape == (2 * sum(len(off) for _, off in stages), INPUTS)
+    assert found.inputs.shape == (2 * sum(len(off) for *_, off in stages), INPUTS)
     assert found.case.max() + 1 == 2 * len(stages) and (np.diff(found.case) >= 0).all()
     assert (found.off < 1).any() and np.isfinite(found.inputs).all()
+    evidence, goals, off = stages[-1]
+    np.testing.assert_allclose(found.inputs[-len(off) :], beside_rivals(evidence, goals), atol=1e-6)
 
 
 def test_nothing_is_right_where_its_things_are_not():
@@ -112,12 +115,13 @@ def test_nothing_is_right_where_its_things_are_not():
     other = next(scenes)[0].asked.observations[0]
     matcher = LearnedMatcher(load_model(BUNDLED))
     absent, *present = cases._cases(group, matcher, SetUp(), np.random.default_rng(0), elsewhere=other)
-    assert len(present) == len(group) and any((off < 1).any() for stages in present for _, off in stages)
-    assert absent and not any((off < 1).any() for _, off in absent)
+    assert len(present) == len(group) and any((off < 1).any() for stages in present for *_, off in stages)
+    assert absent and not any((off < 1).any() for *_, off in absent)
 
 
 def test_as_many_cases_are_made_as_are_asked_for(tmp_path, monkeypatch):
-    case = [(np.zeros((2, INPUTS), np.float32), np.array([0.0, 2.0], np.float32))]
+    goals = np.tile(np.eye(4, dtype=np.float32), (2, 1, 1))
+    case = [(np.zeros((2, len(EVIDENCE)), np.float32), goals, np.array([0.0, 2.0], np.float32))]
     monkeypatch.setattr(cases, "make_cases", lambda *given: [case] * given[-1])
     monkeypatch.setattr("sys.argv", ["cases", "--out", str(tmp_path), "--cases", "23"])
     cases.main()

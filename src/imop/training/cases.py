@@ -49,8 +49,9 @@ ABSENT = 0.3
 MISPLACED = 0.3
 _PER_FILE = 20
 
-Judged = tuple[Float32Array, Float32Array]
-"""Inputs (H, INPUTS) of candidates, and (H,) how far they are off; see `Cases`."""
+Judged = tuple[Float32Array, Float32Array, Float32Array]
+"""Evidence (H, |EVIDENCE|) of candidates, (H, 4, 4) where they take the gripper, and (H,) how far they are
+off; see `Cases`."""
 Execution = tuple[Sequence[Executed[Seen]], Observation | None]
 """The steps of one demonstration and query, and how an execution with other things begins, or None."""
 
@@ -141,9 +142,9 @@ def _progress(
 def _judged(pool: Pool, example: Executed[Seen] | None) -> Judged:
     """A pool's candidates; none is right without an example."""
     goals = pool.goals()
-    inputs = beside_rivals(pool.evidence(), goals).astype(np.float32)
     right = np.zeros((0, 4, 4)) if example is None else example.right_poses()
-    return inputs, off_goals(goals, right).astype(np.float32)
+    evidence, off = pool.evidence(), off_goals(goals, right)
+    return evidence.astype(np.float32), goals.astype(np.float32), off.astype(np.float32)
 
 
 def off_goals(goals: FloatArray, right: FloatArray) -> FloatArray:
@@ -160,14 +161,10 @@ def off_goals(goals: FloatArray, right: FloatArray) -> FloatArray:
 def write_cases(cases: Sequence[Sequence[Judged]], path: Path) -> None:
     """One file, whole or not at all."""
     stages = [stage for case in cases for stage in case]
-    sizes = [len(off) for _, off in stages]
+    evidence, goals, off = (np.concatenate(columns) for columns in zip(*stages, strict=True))
+    case = np.repeat(np.arange(len(stages)), [len(off) for *_, off in stages])
     with replaced(path) as temporary, temporary.open("wb") as file:
-        np.savez_compressed(
-            file,
-            inputs=np.concatenate([inputs for inputs, _ in stages]),
-            off=np.concatenate([off for _, off in stages]),
-            case=np.repeat(np.arange(len(stages)), sizes),
-        )
+        np.savez_compressed(file, evidence=evidence, goals=goals, off=off, case=case)
 
 
 def read_cases(*folders: Path) -> Cases:
@@ -175,8 +172,11 @@ def read_cases(*folders: Path) -> Cases:
     parts, start = [], 0
     for path in (path for folder in folders for path in sorted(folder.glob("*.npz"))):
         with np.load(path) as file:
-            parts.append((file["inputs"], file["off"], file["case"] + start))
-            start += int(file["case"].max()) + 1
+            evidence, goals, off, case = (file[name] for name in ("evidence", "goals", "off", "case"))
+        of_case = np.split(np.arange(len(case)), np.flatnonzero(np.diff(case)) + 1)
+        inputs = [beside_rivals(evidence[which], goals[which]) for which in of_case]
+        parts.append((np.concatenate(inputs, dtype=np.float32), off, case + start))
+        start += int(case.max()) + 1
     return Cases(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
