@@ -4,7 +4,7 @@ import numpy as np
 import torch
 
 from imop.geometry import se3
-from imop.networks.verification import EVIDENCE, INPUTS
+from imop.networks.verification import EVIDENCE
 from imop.policy.interfaces import BEGINNING, PolicyConfig, Progress, Scene
 from imop.policy.proposals import Asked, Matches
 from imop.policy.region import Region
@@ -24,9 +24,9 @@ NOTHING = Matches(*(np.zeros((0, 3)) for _ in range(4)), np.zeros(0))
 class Exact(torch.nn.Module):
     """What is explained exactly and in its colours is right."""
 
-    def probability(self, inputs):
-        column = {name: inputs[:, k] for k, name in enumerate(EVIDENCE)}
-        assert inputs.shape[1] == INPUTS
+    def probability(self, evidence, rival):
+        column = {name: evidence[:, k] for k, name in enumerate(EVIDENCE)}
+        assert evidence.shape[1] == len(EVIDENCE) and rival.shape == (len(evidence), len(evidence))
         return (column["region_exact"] * column["region_color"] * column["backward_exact"]).clamp(0, 1)
 
 

@@ -3,7 +3,7 @@ import pytest
 
 from imop.geometry import se3
 from imop.geometry.perception import Perception
-from imop.training.symmetry import TURNS, Scene, Surface, equal_motions, turns_about
+from imop.training.symmetry import TURNS, Scene, Surface, between_turns, equal_motions, turns_about
 from tests.demos.scenes import Box, observe
 
 HOME = se3.make(se3.euler(x=np.pi), (0.28, 0.0, 1.25))
@@ -81,3 +81,26 @@ def test_turns_are_about_the_middle():
         se3.apply(turns, T[None, :3, 3])[:, 0], np.tile(T[:3, 3], (TURNS, 1)), atol=0.004
     )
     np.testing.assert_allclose(turns[1] @ turns[TURNS - 1], np.eye(4), atol=1e-9)
+
+
+def test_between_two_turns_of_what_is_round_everything_is_right():
+    axis = np.array([0.1, -0.2, 0.8])
+    turns = np.linspace(0.0, 2 * np.pi, TURNS, endpoint=False)
+    T = at(*QUERY)
+
+    def about(angles):
+        R = np.stack([se3.euler(z=float(angle)) for angle in angles])
+        return T @ se3.make(R, axis - R @ axis)
+
+    found = between_turns(about(turns))
+    assert len(found) == 72
+    # All of them, and nothing else.
+    every = about(np.radians(np.arange(0.0, 360.0, 5.0)))
+    for one, other in ((found, every), (every, found)):
+        assert se3.near(one[:, None], other[None], 1e-6, 1e-5).any(axis=1).all()
+
+
+@pytest.mark.parametrize("degrees", [[0.0], [0.0, 180.0], [0.0, 90.0, 180.0, 270.0]])
+def test_between_turns_that_are_farther_apart_nothing_is_right(degrees):
+    motions = np.stack([at(*QUERY) @ se3.make(se3.euler(z=np.radians(angle))) for angle in degrees])
+    np.testing.assert_array_equal(between_turns(motions), motions)

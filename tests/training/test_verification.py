@@ -9,55 +9,75 @@ import torch
 from imop.geometry import se3
 from imop.geometry.accuracy import errors
 from imop.networks.model import BUNDLED, load_model
-from imop.networks.verification import EVIDENCE, INPUTS, VerificationConfig, VerificationNetwork
+from imop.networks.verification import EVIDENCE, VerificationConfig, VerificationNetwork
 from imop.policy.learned import LearnedMatcher
-from imop.policy.verification import beside_rivals
 from imop.training import cases
 from imop.training.cases import Cases, make_cases, off_goals, read_cases, write_cases
 from imop.training.families import TRAINING
 from imop.training.set_up import SetUp
 from imop.training.synthetic import synthetic_executions, synthetic_scenes
 from imop.training.takes import executions, reference
-from imop.training.verification import VerificationTraining, fit, loss
+from imop.training.verification import Grouped, VerificationTraining, fit, loss
 
 
 def some(rng, cases=60):
     """Cases in which the candidate that explains the region best is right, if it explains much of it."""
-    inputs, off, case = [], [], []
+    evidence, off, case = [], [], []
     for k in range(cases):
-        x = rng.normal(size=(6, INPUTS)).astype(np.float32)
-        x[:, len(EVIDENCE)] = x[:, 0] - x[:, 0].max()
-        inputs.append(x)
+        x = rng.normal(size=(6, len(EVIDENCE))).astype(np.float32)
+        evidence.append(x)
         off.append(np.where((x[:, 0] == x[:, 0].max()) & (x[:, 0] > 0.3), 0.0, 2.0).astype(np.float32))
         case.append(np.full(6, k))
-    return Cases(*(np.concatenate(c) for c in (inputs, off, case)))
+    apart = se3.make(np.eye(3), rng.normal(size=(6 * cases, 3)))
+    return Cases(np.concatenate(evidence), apart.astype(np.float32), *map(np.concatenate, (off, case)))
 
 
 def test_what_decides_is_learned(tmp_path):
     torch.manual_seed(0)
-    network = VerificationNetwork(VerificationConfig(width=16))
+    network = VerificationNetwork(VerificationConfig(width=16, members=2))
     reached = fit(network, some(np.random.default_rng(0), 900), VerificationTraining((), tmp_path, steps=400))
     assert reached["right"] > 0.65 * reached["possible"] > 0.5
     assert reached["calibration"] < 0.35 and abs(reached["sure"] - reached["right"]) < 0.25
 
 
 def test_the_loss_by_hand():
-    logits, off = torch.tensor([0.0, 0.0, 0.0]), torch.tensor([0.0, 1.5, math.inf])
     # Two candidates of which one is right, and one that is wrong and has nothing to choose from.
-    value = loss(logits, off, torch.tensor([0, 0, 1]))
+    off = torch.tensor([[0.0, 1.5], [math.inf, 0.0]])
+    value = loss(torch.zeros(2, 2), off, torch.tensor([[True, True], [True, False]]))
     # Each candidate, the choice between the two, and the likeliest of each case.
     assert value.item() == pytest.approx((1 + 0.5 + 1) * math.log(2), rel=1e-5)
 
 
 def test_of_two_right_candidates_the_nearer_one_is_to_be_chosen():
-    off, case = torch.tensor([0.1, 0.8]), torch.zeros(2, dtype=torch.long)
-    assert loss(torch.tensor([3.0, 2.0]), off, case) < loss(torch.tensor([2.0, 3.0]), off, case)
+    off, real = torch.tensor([[0.1, 0.8]]), torch.ones(1, 2, dtype=torch.bool)
+    assert loss(torch.tensor([[3.0, 2.0]]), off, real) < loss(torch.tensor([[2.0, 3.0]]), off, real)
 
 
 def test_a_case_counts_once_however_many_candidates_it_has():
-    few = loss(torch.tensor([1.0, -1.0]), torch.full((2,), 2.0), torch.tensor([0, 1]))
-    many = loss(torch.tensor([1.0, 1.0, 1.0, -1.0]), torch.full((4,), 2.0), torch.tensor([0, 0, 0, 1]))
-    assert few.item() == pytest.approx(many.item())
+    few = loss(torch.tensor([[1.0], [-1.0]]), torch.full((2, 1), 2.0), torch.ones(2, 1, dtype=torch.bool))
+    logits = torch.tensor([[1.0, 1.0, 1.0], [-1.0, 7.0, 7.0]])
+    real = torch.tensor([[True, True, True], [True, False, False]])
+    assert few.item() == pytest.approx(loss(logits, torch.full((2, 3), 2.0), real).item())
+
+
+def test_the_loss_can_be_followed_where_nothing_is_right():
+    logits = torch.zeros(2, 3, requires_grad=True)
+    real = torch.tensor([[True, True, True], [True, True, False]])
+    loss(logits, torch.full((2, 3), math.inf), real).backward()
+    assert logits.grad.isfinite().all() and logits.grad[1, 2] == 0 and (logits.grad[real] > 0).all()
+
+
+def test_cases_of_different_sizes_are_filled_up():
+    rng = np.random.default_rng(0)
+    goals = se3.make(np.eye(3), [[0, 0, 0], [0.5, 0, 0], [0.505, 0, 0]]).astype(np.float32)
+    evidence = rng.normal(size=(3, len(EVIDENCE))).astype(np.float32)
+    cases = Cases(evidence, goals, np.array([0.0, 3.0, np.inf], np.float32), np.array([4, 7, 7]))
+    found, rival, off, real = Grouped(cases, {4, 7}).take([1, 0, 1])
+    assert real.tolist() == [[True, True], [True, False], [True, True]]
+    np.testing.assert_array_equal(found[1, 0], evidence[0])
+    np.testing.assert_array_equal(found[2], evidence[1:])
+    assert off[0].tolist() == [3.0, math.inf] and not rival.any()
+    assert len(Grouped(cases, {7})) == 1
 
 
 def test_candidates_near_to_a_right_pose_are_right():
@@ -101,11 +121,11 @@ def test_cases_are_made_again_written_and_read(tmp_path):
     write_cases(again, tmp_path / "cases-00001.npz")
     found = read_cases(tmp_path)
     stages = [stage for case in made for stage in case]
-    assert found.inputs.shape == (2 * sum(len(off) for *_, off in stages), INPUTS)
+    assert found.evidence.shape == (2 * sum(len(off) for *_, off in stages), len(EVIDENCE))
     assert found.case.max() + 1 == 2 * len(stages) and (np.diff(found.case) >= 0).all()
-    assert (found.off < 1).any() and np.isfinite(found.inputs).all()
-    evidence, goals, off = stages[-1]
-    np.testing.assert_allclose(found.inputs[-len(off) :], beside_rivals(evidence, goals), atol=1e-6)
+    assert (found.off < 1).any() and not np.isinf(found.evidence).any()
+    for values, stored in zip(stages[-1], (found.evidence, found.goals, found.off), strict=True):
+        np.testing.assert_array_equal(stored[-len(values) :], values)
 
 
 def test_nothing_is_right_where_its_things_are_not():

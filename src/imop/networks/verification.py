@@ -5,6 +5,9 @@ A small perceptron over the numbers that `EVIDENCE` names. They come from clouds
 of them it is known which way they speak: who explains more, in colours that agree better, is never less
 likely. The network is built so. A free perceptron learned the cases as well, but held candidates that
 everything spoke for to be less likely than others, where so much had hardly ever spoken for one.
+
+Each candidate is scored on its own first. Then its scores are set beside the best of all candidates, and
+beside the best of its rivals, which act somewhere else: what that is worth is learned as well.
 """
 
 from dataclasses import dataclass
@@ -37,30 +40,18 @@ EVIDENCE = (
     *("wrist", "palm", "fingers"),
 )
 """What is known of a candidate on its own."""
-RIVALRY = (
-    "region_exact",
-    "near_loose",
-    "firm_loose",
-    "taken_loose",
-    "goal_loose",
-    "matches_loose",
-    "pattern",
-    "alike",
-    "clear",
-)
-"""What is compared with the best candidate of all, and with the best that acts somewhere else: numbers of the
-evidence, what is explained in its colour (`alike`), and what is not contradicted by colours (`clear`)."""
-INPUTS = len(EVIDENCE) + 2 * len(RIVALRY)
 FOR = ("exact", "loose", "color", "tight", "matches_near", "forward", "around_backward", "pattern")
 """Endings of the names of evidence that speaks for a candidate, the more of it there is."""
 AGAINST = ("clash", "absent", "wrist", "palm", "fingers")
 """The same of what speaks against it. What has neither ending describes the situation, or may mean either."""
 
+# A rival is not farther behind than this, in scores; where there is none, that far.
+BEHIND = 8.0
+
 
 def directions() -> list[int]:
-    """(INPUTS,) 1 for inputs that speak for a candidate, -1 against it, 0 for those that may do either."""
-    known = [int(name.endswith(FOR)) - int(name.endswith(AGAINST)) for name in EVIDENCE]
-    return known + 2 * len(RIVALRY) * [1]
+    """(|EVIDENCE|,) 1 for what speaks for a candidate, -1 against it, 0 for what may do either."""
+    return [int(name.endswith(FOR)) - int(name.endswith(AGAINST)) for name in EVIDENCE]
 
 
 @dataclass(frozen=True)
@@ -68,18 +59,50 @@ class VerificationConfig:
     """Shape of the verification network.
 
     Attributes:
-        inputs: numbers per candidate.
-        width: of its two hidden layers.
+        evidence: numbers per candidate.
+        width: of the hidden layers.
         situation: of the layers for what may speak either way.
+        scores: of each candidate, that are compared.
+        members: networks whose probabilities are averaged.
     """
 
-    inputs: int = INPUTS
+    evidence: int = len(EVIDENCE)
     width: int = 64
     situation: int = 32
+    scores: int = 8
+    members: int = 3
 
 
 class VerificationNetwork(nn.Module):
-    """Evidence -> logit of being right, monotone in what has a direction.
+    """Evidence of all candidates of a case -> logit of each being right, by each member."""
+
+    def __init__(self, config: VerificationConfig):
+        super().__init__()
+        self.standardized = Standardized(config.evidence)
+        self.members = nn.ModuleList(_Member(config) for _ in range(config.members))
+
+    def forward(self, evidence: Tensor, rival: Tensor, valid: Tensor) -> Tensor:
+        """Logits (members, B, H); of what is no candidate, anything.
+
+        Args:
+            evidence: (B, H, |EVIDENCE|) of B cases with up to H candidates; NaN where nothing is known.
+            rival: (B, H, H) whether the second is a rival of the first.
+            valid: (B, H) False for what only fills up a case.
+        """
+        evidence = torch.where(evidence.isnan(), self.standardized.mean, evidence)
+        x = torch.zeros_like(evidence)
+        x[valid] = self.standardized(evidence[valid])
+        return torch.stack([member(x, rival, valid) for member in self.members])
+
+    def probability(self, evidence: Tensor, rival: Tensor) -> Tensor:
+        """(H,) of being right, of one case's candidates with evidence (H, |EVIDENCE|) and rivals (H, H)."""
+        valid = torch.ones(1, len(evidence), dtype=torch.bool)
+        with torch.inference_mode():
+            return torch.sigmoid(self(evidence[None], rival[None], valid))[:, 0].mean(dim=0)
+
+
+class _Member(nn.Module):
+    """Monotone in what has a direction.
 
     What has none goes through layers of its own, which shift the hidden units of the others.
     """
@@ -90,8 +113,7 @@ class VerificationNetwork(nn.Module):
 
     def __init__(self, config: VerificationConfig):
         super().__init__()
-        self.standardized = Standardized(config.inputs)
-        width, between, signs = config.width, config.situation, directions()
+        between, signs = config.situation, directions()
         directed, free = ([i for i, sign in enumerate(signs) if bool(sign) == has] for has in (True, False))
         self.register_buffer("directed", torch.tensor(directed), persistent=False)
         self.register_buffer("free", torch.tensor(free), persistent=False)
@@ -99,28 +121,38 @@ class VerificationNetwork(nn.Module):
         self.situation = nn.Sequential(
             nn.Linear(len(free), between), nn.SiLU(), nn.Linear(between, between), nn.SiLU()
         )
-        self.shifts = nn.ModuleList(nn.Linear(between, out) for out in (width, width, 1))
-        shapes = (width, len(directed)), (width, width), (1, width)
-        self.weights = nn.ParameterList(torch.randn(shape) / shape[1] ** 0.5 for shape in shapes)
+        self.alone = _Monotone(len(directed), config.width, config.scores, between)
+        self.beside = _Monotone(len(directed) + 3 * config.scores, config.width, 1, between)
 
-    def forward(self, evidence: Tensor) -> Tensor:
-        """Logits (H,) of candidates with evidence (H, INPUTS); NaN where nothing is known."""
-        evidence = torch.where(evidence.isnan(), self.standardized.mean, evidence)
-        x = self.standardized(evidence)
-        situation, h = self.situation(x[:, self.free]), x[:, self.directed] * self.signs
+    def forward(self, x: Tensor, rival: Tensor, valid: Tensor) -> Tensor:
+        """Logits (B, H) of standardized evidence (B, H, |EVIDENCE|)."""
+        situation, known = self.situation(x[..., self.free]), x[..., self.directed] * self.signs
+        scores = self.alone(known, situation)
+        best = torch.where(valid[..., None], scores, -torch.inf).amax(dim=1, keepdim=True)
+        others = torch.where((rival & valid[:, None])[..., None], scores[:, None], -torch.inf)
+        ahead = (scores - others.amax(dim=2)).clamp(-BEHIND, BEHIND)
+        logits: Tensor = self.beside(torch.cat([known, scores, scores - best, ahead], dim=-1), situation)
+        return logits[..., 0]
+
+
+class _Monotone(nn.Module):
+    """Three layers that grow with every input; what shifts them may do as it likes."""
+
+    def __init__(self, inputs: int, width: int, outputs: int, situation: int) -> None:
+        super().__init__()
+        shapes = (width, inputs), (width, width), (outputs, width)
+        self.weights = nn.ParameterList(torch.randn(shape) / shape[1] for shape in shapes)
+        self.shifts = nn.ModuleList(nn.Linear(situation, out) for out, _ in shapes)
+
+    def forward(self, h: Tensor, situation: Tensor) -> Tensor:
+        """(..., outputs) of inputs (..., inputs) and (..., situation)."""
         for number, (weight, shift) in enumerate(zip(self.weights, self.shifts, strict=True)):
             h = _bent(h) if number else h
             h = F.linear(h, weight.abs()) + shift(situation)
-        logits: Tensor = h[:, 0]
-        return logits
-
-    def probability(self, evidence: Tensor) -> Tensor:
-        """(H,) of being right."""
-        with torch.inference_mode():
-            return torch.sigmoid(self(evidence))
+        return h
 
 
 def _bent(x: Tensor) -> Tensor:
-    """Half of the units (H, W) saturate below, the others above: sums of one kind are convex, or concave."""
+    """Half of the units (..., W) saturate below, half above: sums of one kind are convex, or concave."""
     below, above = x.chunk(2, dim=-1)
     return torch.cat([F.elu(below), -F.elu(-above)], dim=-1)

@@ -56,6 +56,7 @@ class Template:
         weights: (M, 6) of the region, near the gripper, of what stays in place, of what is taken, of the
             goal, of the context.
         marks: variance of the region's shades.
+        telling: share of it that is not noise: what has no marks has no pattern either.
     """
 
     def __init__(
@@ -83,6 +84,7 @@ class Template:
         self.spread = np.full(len(self.cloud), OFFSET)
         self.spread[: len(chosen)] = region.spreads[chosen]
         self.size, self.marks = len(chosen), float(self.hue[: len(chosen)].var(axis=0).sum())
+        self.telling = self.marks / (self.marks + NOISE)
         self.glance = np.flatnonzero(np.concatenate(looks))
         self.whole, self.beside = Surface(region.whole, views), Surface(beside, views)
         self.p_goal = p_goal
@@ -153,9 +155,8 @@ def shares(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
     all_of_it = max(w.sum(), 1e-9)
     columns += [loose @ w / all_of_it, (loose * color) @ w / np.maximum(loose @ w, 1e-9)]
     columns += [(absent * (1 - loose)) @ w / all_of_it]
-    columns += [
-        pattern(template.hue, surface.shades[found.index].reshape(H, -1, 4), loose * template.weights[:, 0])
-    ]
+    seen, whole = surface.shades[found.index].reshape(H, -1, 4), loose * template.weights[:, 0]
+    columns += [template.telling * pattern(template.hue, seen, whole)]
     rows = np.stack([np.asarray(c) for c in columns], axis=1)
     backward = np.stack([_backward(template, surface, M) for M in T])
     return np.concatenate([rows, backward], axis=1)

@@ -1,7 +1,7 @@
 """Candidates of one step in one scene: refined, verified by evidence, and ranked by their probability.
 
-The evidence of each candidate is set beside that of its rivals; the verification network, which learned what
-that is worth, makes a probability of it (`networks/verification.py`).
+The verification network, which learned what the evidence of each candidate and of its rivals is worth, makes
+probabilities of it (`networks/verification.py`).
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ import torch
 from imop.geometry import se3
 from imop.geometry.icp import CLOSE, FINEST
 from imop.geometry.ransac import distinct
-from imop.networks.verification import EVIDENCE, RIVALRY, VerificationNetwork
+from imop.networks.verification import VerificationNetwork
 from imop.policy.evidence import Template, crowd, glance, painted, palette, shares
 from imop.policy.interfaces import Candidate, PolicyConfig, Transition
 from imop.policy.proposals import Asked, Matches
@@ -41,19 +41,9 @@ class Verifier:
             evidence: (H, |EVIDENCE|).
             goals: (H, 4, 4) where the candidates take the gripper.
         """
-        inputs = torch.from_numpy(beside_rivals(evidence, goals).astype(np.float32))
-        return np.asarray(self._network.probability(inputs).double().numpy())
-
-
-def beside_rivals(evidence: FloatArray, goals: FloatArray) -> FloatArray:
-    """(H, INPUTS) the evidence, and how much of it candidates have more than the best and the best rival."""
-    column = {name: evidence[:, k] for k, name in enumerate(EVIDENCE)}
-    column["alike"] = column["firm_loose"] * column["firm_color"]
-    column["clear"] = 1 - (column["region_clash"] + column["backward_clash"]) / 2
-    compared = np.stack([column[name] for name in RIVALRY], axis=1)
-    elsewhere = rivals(goals)
-    other = np.where(elsewhere[:, :, None], compared[None], 0.0).max(axis=1)
-    return np.concatenate([evidence, compared - compared.max(axis=0), compared - other], axis=1)
+        known = torch.from_numpy(evidence.astype(np.float32))
+        p = self._network.probability(known, torch.from_numpy(rivals(goals)))
+        return np.asarray(p.double().numpy())
 
 
 def rivals(goals: FloatArray) -> BoolArray:

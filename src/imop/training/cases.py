@@ -27,7 +27,7 @@ from imop.networks.model import BUNDLED, Model, load_model
 from imop.policy.interfaces import BEGINNING, Progress
 from imop.policy.learned import LearnedMatcher
 from imop.policy.registration import RegistrationMatcher
-from imop.policy.verification import Pool, beside_rivals
+from imop.policy.verification import Pool
 from imop.training.families import TRAINING
 from imop.training.recorded import recorded_executions
 from imop.training.set_up import SetUp
@@ -61,12 +61,14 @@ class Cases:
     """Candidates of several cases.
 
     Attributes:
-        inputs: (N, INPUTS) of the verification network.
+        evidence: (N, |EVIDENCE|) of them.
+        goals: (N, 4, 4) where they take the gripper.
         off: (N,) how far the candidate is from a right one, in what is still right (`accuracy.COARSE`).
         case: (N,) the number of the case and stage that it belongs to, not decreasing.
     """
 
-    inputs: Float32Array
+    evidence: Float32Array
+    goals: Float32Array
     off: Float32Array
     case: NDArray[np.int64]
 
@@ -173,9 +175,7 @@ def read_cases(*folders: Path) -> Cases:
     for path in (path for folder in folders for path in sorted(folder.glob("*.npz"))):
         with np.load(path) as file:
             evidence, goals, off, case = (file[name] for name in ("evidence", "goals", "off", "case"))
-        of_case = np.split(np.arange(len(case)), np.flatnonzero(np.diff(case)) + 1)
-        inputs = [beside_rivals(evidence[which], goals[which]) for which in of_case]
-        parts.append((np.concatenate(inputs, dtype=np.float32), off, case + start))
+        parts.append((evidence, goals, off, case + start))
         start += int(case.max()) + 1
     return Cases(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 

@@ -15,7 +15,7 @@ from imop.networks.graph import thin
 from imop.training.invariance import INVARIANT
 from imop.training.pairs import StepPair, next_carry
 from imop.training.stage import STORED
-from imop.training.symmetry import Scene, Surface, equal_motions
+from imop.training.symmetry import Scene, Surface, between_turns, equal_motions
 from imop.training.takes import Executed
 from imop.types import Action, BoolArray, Demonstration, FloatArray, Observation
 
@@ -69,8 +69,13 @@ class Take:
         return np.isin(cloud.ids, [i for i, name in known.items() if name in names])
 
 
-Example = Executed[Take]
-"""A pair, and the takes that it comes from."""
+@dataclass(frozen=True, eq=False)
+class Example(Executed[Take]):
+    """A pair, and the takes that it comes from."""
+
+    def right_poses(self) -> FloatArray:
+        """(S, 4, 4) where the gripper may go in the query; of what is round, every 5 degrees."""
+        return between_turns(self.pair.T_query_support) @ self.pair.T_world_goal
 
 
 def take(demonstration: Demonstration, robot_mask: RobotMask | None) -> Take:

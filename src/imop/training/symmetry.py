@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import expm, logm
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
@@ -20,6 +21,8 @@ from imop.geometry.neighbours import nearest
 from imop.types import BoolArray, FloatArray, Observation
 
 TURNS = 12
+_FINER = 6
+"""So many steps are made of one turn of what is round."""
 _NEAR = 0.007
 """An observed point this near explains a moved one, metres: a pixel covers that much."""
 _NEIGHBOURS = 4
@@ -156,6 +159,23 @@ def equal_motions(
         if query.uncovered(surface, T) < _UNCOVERED:
             found.append(T)
     return np.stack(found) @ se3.invert(T_support_goal)
+
+
+def between_turns(motions: FloatArray) -> FloatArray:
+    """(S', 4, 4) motions (S, 4, 4) of `equal_motions`, and those between two that are one turn apart.
+
+    What looks the same after one of `TURNS` is round. Between the two, there is one every 5 degrees.
+    """
+    found = [motions]
+    for A in motions:
+        turns = se3.invert(A) @ motions
+        one = np.isclose(se3.rotation_distance(turns, np.eye(4)), 2 * np.pi / TURNS, atol=_SAME_TURN)
+        # Of a turn and its reverse, which is the same of the other motion, one is enough.
+        for turn in turns[one & (turns[:, 1, 0] > 0)]:
+            found.append(
+                np.stack([A @ expm(share * logm(turn)).real for share in np.arange(1, _FINER) / _FINER])
+            )
+    return np.concatenate(found)
 
 
 def turns_about(points: FloatArray, axis: FloatArray) -> FloatArray:

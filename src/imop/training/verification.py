@@ -1,4 +1,4 @@
-"""Training of the verification network on cases; a minute on a CPU.
+"""Training of the verification network on cases; ten minutes on a CPU.
 
 python -m imop.training.verification --cases DIR [DIR ...] --weights FOLDER --out FOLDER
 """
@@ -6,6 +6,7 @@ python -m imop.training.verification --cases DIR [DIR ...] --weights FOLDER --ou
 import json
 import shlex
 import sys
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,14 +16,18 @@ import tyro
 from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional as F
+from torch.nn.utils.rnn import pad_sequence
 
 from imop.networks.model import BUNDLED, CARD, load_model, save_model
 from imop.networks.verification import VerificationNetwork
+from imop.policy.verification import rivals
 from imop.training.cases import Cases, read_cases
 from imop.types import FloatArray
 
 PRECISE = 3.0
 """How fast a right candidate is worth less in the choice, the farther it is off."""
+NEVER = -1e4
+"""Logit of what is no candidate."""
 BINS = 10
 """Of equal count, in which probabilities are compared with what came true."""
 
@@ -58,23 +63,40 @@ class VerificationTraining:
     seed: int = 0
 
 
-class _Grouped:
-    """Cases as tensors, by case."""
+class Grouped:
+    """Cases as tensors, by case.
+
+    Args:
+        cases: all of them.
+        which: numbers of those that are wanted.
+    """
 
     def __init__(self, cases: Cases, which: set[int]) -> None:
-        kept = np.isin(cases.case, sorted(which))
-        self.inputs, self.off = torch.from_numpy(cases.inputs[kept]), torch.from_numpy(cases.off[kept])
-        starts = np.flatnonzero(np.diff(cases.case[kept], prepend=-1))
-        self.ranges = list(zip(starts, [*starts[1:], len(self.off)], strict=True))
+        starts = np.flatnonzero(np.diff(cases.case, prepend=-1))
+        self._cases = [
+            (
+                torch.from_numpy(cases.evidence[a:b]),
+                torch.from_numpy(rivals(cases.goals[a:b].astype(np.float64))),
+                torch.from_numpy(cases.off[a:b]),
+            )
+            for a, b in zip(starts, [*starts[1:], len(cases.case)], strict=True)
+            if int(cases.case[a]) in which
+        ]
 
-    def take(self, which: np.ndarray) -> tuple[Tensor, Tensor, Tensor]:
-        """Inputs, how far off, and the case of each candidate."""
-        index = np.concatenate([np.arange(*self.ranges[i]) for i in which])
-        case = np.repeat(np.arange(len(which)), [self.ranges[i][1] - self.ranges[i][0] for i in which])
-        return self.inputs[index], self.off[index], torch.from_numpy(case)
+    def __len__(self) -> int:
+        return len(self._cases)
+
+    def take(self, which: Iterable[int]) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Evidence (B, H, |EVIDENCE|), rivals (B, H, H), how far off (B, H), and which are real (B, H)."""
+        evidence, rival, off = zip(*(self._cases[i] for i in which), strict=True)
+        most = max(len(x) for x in off)
+        beside = torch.stack([F.pad(x, (0, most - len(x), 0, most - len(x))) for x in rival])
+        real = torch.stack([torch.arange(most) < len(x) for x in off])
+        filled, away = (pad_sequence(list(x), batch_first=True) for x in (evidence, off))
+        return filled, beside, away, real
 
 
-def loss(logits: Tensor, off: Tensor, case: Tensor) -> Tensor:
+def loss(logits: Tensor, off: Tensor, real: Tensor) -> Tensor:
     """Cross entropy of each candidate, and of the choice among those of a case; the mean over cases.
 
     In the choice a right candidate is worth more, the nearer it is: the loss is the negative logarithm of the
@@ -82,32 +104,19 @@ def loss(logits: Tensor, off: Tensor, case: Tensor) -> Tensor:
     counts once more on its own: its probability is told, and as the largest of many it would be too large.
 
     Args:
-        logits: (N,).
-        off: (N,) how far the candidate is off; it is right below 1.
-        case: (N,) the number of its case, from 0 on.
+        logits: (B, H).
+        off: (B, H) how far the candidate is off; it is right below 1.
+        real: (B, H) False for what only fills up a case.
     """
-    count, right = int(case.max()) + 1, off < 1
+    right = (off < 1) & real
     each = F.binary_cross_entropy_with_logits(logits, right.to(logits), reduction="none")
-    sizes = torch.bincount(case, minlength=count)
-    single = logits.new_zeros(count).index_add(0, case, each) / sizes
-    some = torch.zeros(count).index_add(0, case, right.float()) > 0
-    worth = torch.where(right, logits - PRECISE * off, -1e4)
-    total, good = (_logsumexp(x, case, count) for x in (logits, worth))
+    single = (each * real).sum(dim=1) / real.sum(dim=1)
+    total = logits.masked_fill(~real, NEVER).logsumexp(dim=1)
+    good = (logits - PRECISE * off).masked_fill(~right, NEVER).logsumexp(dim=1)
+    some = right.any(dim=1)
     choice = torch.where(some, total - good, 0.0).sum() / some.sum().clamp_min(1)
-    return single.mean() + 0.5 * choice + each[_likeliest(logits, case, count)].mean()
-
-
-def _likeliest(logits: Tensor, case: Tensor, count: int) -> Tensor:
-    """(count,) the number of each case's likeliest candidate; those of a case follow each other."""
-    sizes = torch.bincount(case, minlength=count).tolist()
-    starts = torch.tensor([0, *sizes[:-1]]).cumsum(0)
-    chosen = [int(part.argmax()) for part in torch.split(logits.detach(), sizes)]
-    return starts + torch.tensor(chosen)
-
-
-def _logsumexp(x: Tensor, case: Tensor, count: int) -> Tensor:
-    top = x.detach().new_full((count,), -1e9).scatter_reduce(0, case, x.detach(), "amax")
-    return top + x.new_zeros(count).index_add(0, case, (x - top[case]).exp()).log()
+    likeliest = logits.masked_fill(~real, NEVER).argmax(dim=1, keepdim=True)
+    return single.mean() + 0.5 * choice + each.gather(1, likeliest).mean()
 
 
 def fit(network: VerificationNetwork, cases: Cases, config: VerificationTraining) -> dict[str, float]:
@@ -116,25 +125,25 @@ def fit(network: VerificationNetwork, cases: Cases, config: VerificationTraining
     torch.manual_seed(config.seed)
     known = np.unique(cases.case)
     held = set(known[-max(1, round(config.held * len(known))) :].tolist())
-    train, test = _Grouped(cases, set(known.tolist()) - held), _Grouped(cases, held)
+    train, test = Grouped(cases, set(known.tolist()) - held), Grouped(cases, held)
     optimizer = torch.optim.AdamW(
         network.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
     )
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, config.learning_rate, config.steps)
     network.train()
     for _ in range(config.steps):
-        inputs, off, case = train.take(rng.integers(len(train.ranges), size=config.batch))
-        dropped = torch.rand_like(inputs) < config.dropout
-        inputs = torch.where(dropped, network.standardized.mean, inputs)
+        evidence, rival, off, real = train.take(rng.integers(len(train), size=config.batch).tolist())
+        dropped = torch.rand_like(evidence) < config.dropout
         optimizer.zero_grad()
-        torch.autograd.backward(loss(network(inputs), off, case))
+        opinions = network(torch.where(dropped, torch.nan, evidence), rival, real)
+        torch.autograd.backward(torch.stack([loss(logits, off, real) for logits in opinions]).sum())
         optimizer.step()
         schedule.step()
     network.eval()
-    return {**measure(network, test), "cases": float(len(train.ranges))}
+    return {**measure(network, test), "cases": float(len(train))}
 
 
-def measure(network: VerificationNetwork, cases: _Grouped) -> dict[str, float]:
+def measure(network: VerificationNetwork, cases: Grouped) -> dict[str, float]:
     """Of the likeliest candidate of each case: how often right, mean probability, calibration error.
 
     Returns:
@@ -142,11 +151,15 @@ def measure(network: VerificationNetwork, cases: _Grouped) -> dict[str, float]:
         off: how far the likeliest ones that are right are off, in the mean; 1 is just not right.
         calibration: expected calibration error over ten bins of equal size.
     """
-    p = network.probability(cases.inputs).numpy()
-    best = [a + int(np.argmax(p[a:b])) for a, b in cases.ranges]
-    off, sure = cases.off.numpy()[best], p[best]
+    best, p_best, possible = [], [], []
+    for number in range(len(cases)):
+        evidence, rival, away, _ = (x[0] for x in cases.take([number]))
+        p = network.probability(evidence, rival)
+        best.append(float(away[p.argmax()]))
+        p_best.append(float(p.max()))
+        possible.append(bool((away < 1).any()))
+    off, sure = np.array(best), np.array(p_best)
     hit = (off < 1).astype(float)
-    possible = [bool((cases.off[a:b] < 1).any()) for a, b in cases.ranges]
     return {
         "right": float(hit.mean()),
         "possible": float(np.mean(possible)),
