@@ -137,6 +137,7 @@ class Pool:
         self.motions: list[FloatArray] = []
         self.generators: list[str] = []
         self._rows: list[FloatArray] = []
+        self._probabilities = np.zeros(0)
 
     def moved(self, part: Part, T: FloatArray) -> FloatArray:
         """The motion (4, 4) near `T` that lays a part of the region onto the scene, about."""
@@ -211,7 +212,9 @@ class Pool:
 
     def probabilities(self) -> FloatArray:
         """(H,) of being right."""
-        return self._sought.verifier(self.evidence(), self.goals())
+        if len(self._probabilities) < len(self.motions):
+            self._probabilities = self._sought.verifier(self.evidence(), self.goals())
+        return self._probabilities
 
     def best(self, count: int) -> list[FloatArray]:
         """The likeliest motions so far, distinct; fewer than `count` if there are fewer."""
