@@ -45,16 +45,20 @@ def test_cases_are_judged_together_as_they_are_alone():
 
 
 def test_what_speaks_for_a_candidate_never_makes_it_less_likely_and_the_reverse():
-    judge, (evidence, rival), signs = network(1), some(20), torch.tensor(directions())
+    judge, (evidence, rival), signs = network(1), some(40), torch.tensor(directions())
     known = dict(zip(EVIDENCE, signs.tolist(), strict=True))
     assert known["near_loose"] == known["around_backward"] == 1 and known["palm"] == known["goal_clash"] == -1
     assert known["backward_size"] == known["matches_sure"] == known["near_spread"] == known["tilt"] == 0
-    before = judge.probability(evidence, rival)
+    evidence, real = 10 * evidence, torch.ones(len(rival), len(rival), dtype=torch.bool)
+    # One case for each candidate, in which more speaks for that one alone.
+    cases, rivals = (x.expand(len(rival), *x.shape) for x in (evidence, rival))
+    before = judge(cases, rivals, real).diagonal(dim1=1, dim2=2)
+    own = torch.eye(len(rival))
     for k in signs.nonzero()[:, 0].tolist():
-        for candidate in range(0, 20, 5):
-            more = evidence.clone()
-            more[candidate, k] += 2.0 * signs[k]
-            assert judge.probability(more, rival)[candidate] >= before[candidate] - 1e-5
+        more = cases.clone()
+        more[..., k] += 2.0 * signs[k] * torch.rand(len(rival)) * own
+        assert (judge(more, rivals, real).diagonal(dim1=1, dim2=2) >= before - 1e-5).all()
+    assert (judge(cases + 5.0 * signs, rivals, real).diagonal(dim1=1, dim2=2) > before).any()
 
 
 def test_a_rival_that_more_speaks_for_makes_no_candidate_likelier():

@@ -81,24 +81,24 @@ class VerificationNetwork(nn.Module):
         self.standardized = Standardized(config.evidence)
         self.members = nn.ModuleList(_Member(config) for _ in range(config.members))
 
-    def forward(self, evidence: Tensor, rival: Tensor, valid: Tensor) -> Tensor:
+    def forward(self, evidence: Tensor, rival: Tensor, real: Tensor) -> Tensor:
         """Logits (members, B, H); of what is no candidate, anything.
 
         Args:
             evidence: (B, H, |EVIDENCE|) of B cases with up to H candidates; NaN where nothing is known.
             rival: (B, H, H) whether the second is a rival of the first.
-            valid: (B, H) False for what only fills up a case.
+            real: (B, H) False for what only fills up a case.
         """
         evidence = torch.where(evidence.isnan(), self.standardized.mean, evidence)
         x = torch.zeros_like(evidence)
-        x[valid] = self.standardized(evidence[valid])
-        return torch.stack([member(x, rival, valid) for member in self.members])
+        x[real] = self.standardized(evidence[real])
+        return torch.stack([member(x, rival, real) for member in self.members])
 
     def probability(self, evidence: Tensor, rival: Tensor) -> Tensor:
         """(H,) of being right, of one case's candidates with evidence (H, |EVIDENCE|) and rivals (H, H)."""
-        valid = torch.ones(1, len(evidence), dtype=torch.bool)
+        real = torch.ones(1, len(evidence), dtype=torch.bool)
         with torch.inference_mode():
-            return torch.sigmoid(self(evidence[None], rival[None], valid))[:, 0].mean(dim=0)
+            return torch.sigmoid(self(evidence[None], rival[None], real))[:, 0].mean(dim=0)
 
 
 class _Member(nn.Module):
@@ -124,12 +124,12 @@ class _Member(nn.Module):
         self.alone = _Monotone(len(directed), config.width, config.scores, between)
         self.beside = _Monotone(len(directed) + 3 * config.scores, config.width, 1, between)
 
-    def forward(self, x: Tensor, rival: Tensor, valid: Tensor) -> Tensor:
+    def forward(self, x: Tensor, rival: Tensor, real: Tensor) -> Tensor:
         """Logits (B, H) of standardized evidence (B, H, |EVIDENCE|)."""
         situation, known = self.situation(x[..., self.free]), x[..., self.directed] * self.signs
         scores = self.alone(known, situation)
-        best = torch.where(valid[..., None], scores, -torch.inf).amax(dim=1, keepdim=True)
-        others = torch.where((rival & valid[:, None])[..., None], scores[:, None], -torch.inf)
+        best = torch.where(real[..., None], scores, -torch.inf).amax(dim=1, keepdim=True)
+        others = torch.where((rival & real[:, None])[..., None], scores[:, None], -torch.inf)
         ahead = (scores - others.amax(dim=2)).clamp(-BEHIND, BEHIND)
         logits: Tensor = self.beside(torch.cat([known, scores, scores - best, ahead], dim=-1), situation)
         return logits[..., 0]

@@ -56,7 +56,6 @@ class Template:
         weights: (M, 6) of the region, near the gripper, of what stays in place, of what is taken, of the
             goal, of the context.
         marks: variance of the region's shades.
-        telling: share of it that is not noise: what has no marks has no pattern either.
     """
 
     def __init__(
@@ -84,7 +83,6 @@ class Template:
         self.spread = np.full(len(self.cloud), OFFSET)
         self.spread[: len(chosen)] = region.spreads[chosen]
         self.size, self.marks = len(chosen), float(self.hue[: len(chosen)].var(axis=0).sum())
-        self.telling = self.marks / (self.marks + NOISE)
         self.glance = np.flatnonzero(np.concatenate(looks))
         self.whole, self.beside = Surface(region.whole, views), Surface(beside, views)
         self.p_goal = p_goal
@@ -155,8 +153,9 @@ def shares(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
     all_of_it = max(w.sum(), 1e-9)
     columns += [loose @ w / all_of_it, (loose * color) @ w / np.maximum(loose @ w, 1e-9)]
     columns += [(absent * (1 - loose)) @ w / all_of_it]
-    seen, whole = surface.shades[found.index].reshape(H, -1, 4), loose * template.weights[:, 0]
-    columns += [template.telling * pattern(template.hue, seen, whole)]
+    # What has no marks has no pattern either.
+    telling = template.marks / (template.marks + NOISE)
+    columns += [telling * _paint(template, surface, found.index.reshape(H, -1), loose)]
     rows = np.stack([np.asarray(c) for c in columns], axis=1)
     backward = np.stack([_backward(template, surface, M) for M in T])
     return np.concatenate([rows, backward], axis=1)
@@ -166,8 +165,14 @@ def painted(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
     """(H,) how well the paint of the region lies, after motions (H, 4, 4), as it was shown; see `pattern`."""
     which = np.arange(template.size)
     found = surface.explain(*template.moved(T, which), *_tiled(template, which, len(T)))
-    loose = found.loose.reshape(len(T), -1) * template.weights[which, 0]
-    return pattern(template.hue[which], surface.shades[found.index].reshape(len(T), -1, 4), loose)
+    return _paint(template, surface, found.index.reshape(len(T), -1), found.loose.reshape(len(T), -1))
+
+
+def _paint(template: Template, surface: Surface, index: NDArray[np.int64], loose: FloatArray) -> FloatArray:
+    """(H,) `pattern` of the region, whose counterparts come first among (H, M) and fit as well as `loose`."""
+    size = template.size
+    weight = loose[:, :size] * template.weights[:size, 0]
+    return pattern(template.hue[:size], surface.shades[index[:, :size]], weight)
 
 
 def palette(template: Template, surface: Surface) -> float:

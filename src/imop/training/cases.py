@@ -104,14 +104,14 @@ def _cases(
     found, answers = [], dict[int, FloatArray]()
     if elsewhere is not None:
         pools = prepared[0].search.pools(set_up.see(elsewhere), BEGINNING)
-        found.append([_judged(pool, None) for pool in pools if pool.motions])
+        found.append([_judged(pool, np.zeros((0, 4, 4))) for pool in pools if pool.motions])
     for example in group:
-        progress = _progress(example, group, answers, rng)
+        progress, right = _progress(example, group, answers, rng), example.right_poses()
         stages = []
         query = set_up.see(example.asked.observations[example.step])
         for pool in prepared[example.step].search.pools(query, progress):
             if pool.motions:
-                stages.append(_judged(pool, example))
+                stages.append(_judged(pool, right))
                 answers[example.step] = pool.best(1)[0]
         found.append(stages)
     return found
@@ -141,10 +141,9 @@ def _progress(
     return Progress(off @ T)
 
 
-def _judged(pool: Pool, example: Executed[Seen] | None) -> Judged:
-    """A pool's candidates; none is right without an example."""
+def _judged(pool: Pool, right: FloatArray) -> Judged:
+    """A pool's candidates, where the gripper may go to poses (S, 4, 4)."""
     goals = pool.goals()
-    right = np.zeros((0, 4, 4)) if example is None else example.right_poses()
     evidence, off = pool.evidence(), off_goals(goals, right)
     return evidence.astype(np.float32), goals.astype(np.float32), off.astype(np.float32)
 

@@ -166,15 +166,13 @@ def between_turns(motions: FloatArray) -> FloatArray:
 
     What looks the same after one of `TURNS` is round. Between the two, there is one every 5 degrees.
     """
+    shares = np.arange(1, _FINER)[:, None, None] / _FINER
     found = [motions]
     for A in motions:
         turns = se3.invert(A) @ motions
         one = np.isclose(se3.rotation_distance(turns, np.eye(4)), 2 * np.pi / TURNS, atol=_SAME_TURN)
         # Of a turn and its reverse, which is the same of the other motion, one is enough.
-        for turn in turns[one & (turns[:, 1, 0] > 0)]:
-            found.append(
-                np.stack([A @ expm(share * logm(turn)).real for share in np.arange(1, _FINER) / _FINER])
-            )
+        found += [A @ expm(shares * logm(turn)).real for turn in turns[one & (turns[:, 1, 0] > 0)]]
     return np.concatenate(found)
 
 
