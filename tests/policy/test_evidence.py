@@ -6,7 +6,7 @@ import pytest
 from imop.geometry import se3
 from imop.geometry.cloud import concatenate
 from imop.networks.verification import EVIDENCE
-from imop.policy.evidence import Template, crowd, glance, painted, palette, pattern, shares
+from imop.policy.evidence import Template, crowd, glance, looks, palette, pattern, shares
 from imop.policy.interfaces import PolicyConfig
 from imop.policy.region import Goal, Region
 from imop.policy.target import OFFSET, Surface, shades
@@ -182,8 +182,28 @@ def test_paint_tells_a_turn_before_its_colours_are_known(yaw):
     cloud, query = marked(RED, GREEN), moved(marked(GREEN, BLUE), at(0, 0, 0, yaw=yaw))
     template = Template(region(cloud), GOAL, cloud, (), PolicyConfig())
     turns = np.stack([at(0, 0, 0, yaw=yaw), at(0, 0, 0, yaw=yaw + np.pi)])
-    right, other = painted(template, Surface(query, ()), turns)
-    assert right > other + 0.2
+    right, other = looks(template, Surface(query, ()), turns, template.size)
+    assert right[2] > other[2] + 0.2
+
+
+def test_shape_and_colours_look_right_where_they_are():
+    cloud = marked(RED, GREEN)
+    template = Template(region(cloud), GOAL, cloud, (), PolicyConfig())
+    motions = np.stack([np.eye(4), at(0, 0, 0, yaw=np.pi), at(0.03, 0, 0)])
+    right, turned, off = looks(template, Surface(cloud, ()), motions, 200)
+    assert right[0] > 0.99 > turned[0] > 0.75 > off[0]
+    assert right[1] > 0.99 > 0.8 > turned[1]
+
+
+def test_what_looks_like_something_else_that_was_shown_is_claimed_by_it():
+    cloud = box(SIZE, RED)
+    beside = Template(region(cloud), GOAL, cloud, (), PolicyConfig(), others=box(SIZE, GREEN).colors)
+    claims = {}
+    for color in (RED, GREEN, BLUE):
+        row = shares(beside, Surface(box(SIZE, color, seed=1), (camera(),)), np.eye(4)[None])[0]
+        claims[color] = dict(zip(EVIDENCE, row, strict=False))["claimed"]
+    assert claims[GREEN] > 0.9 and claims[RED] == 0 and claims[BLUE] < 0.1
+    assert evidence(cloud, box(SIZE, GREEN, seed=1))["claimed"] == 0
 
 
 def test_a_contradiction_of_colours_is_seen_though_most_of_them_agree():

@@ -9,6 +9,7 @@ import torch
 from imop.errors import CorruptData, ImopError, InvalidInput, NoConfidentMatch
 from imop.geometry import se3
 from imop.geometry.focus import Focus
+from imop.geometry.neighbours import nearest
 from imop.geometry.view_alignment import corrected, find_errors
 from imop.networks.model import Model, ModelConfig, save_model
 from imop.policy.one_shot import OneShotPolicy
@@ -136,6 +137,26 @@ def test_locating_a_step_changes_nothing_and_is_what_act_does(policy, wanted):
     told = [policy.locate(scene, step) for step in (0, 1, 0)]
     assert same(told[0], told[2]) and same(told[0], policy.act(wanted.keyframes[0].observation))
     assert told[1].match.step == 1
+
+
+def test_what_is_hidden_now_is_where_it_was_seen_before(policy, wanted):
+    first, later = wanted.keyframes[0].observation, wanted.keyframes[1].observation
+    earlier = policy.see(first)
+    tip = later.T_world_gripper[:3, 3]
+    far = np.linalg.norm(earlier.fused.points - tip, axis=1) > 0.25
+    lost = earlier.fused.points[far & ~earlier.ground.bare]
+    blind = with_depth(later, np.nan)
+    one = next(iter(later.views))
+    blind = replace(blind, views={**blind.views, one: _lower_quarter(later.views[one])})
+    alone, remembered = policy.see(blind), policy.see(blind, earlier=earlier)
+    near = [(nearest(lost, scene.fused.points)[0] < 0.012).mean() for scene in (alone, remembered)]
+    assert near[1] > 0.95 and near[1] > near[0] + 0.2
+
+
+def _lower_quarter(view):
+    depth = view.depth.copy()
+    depth[: 3 * len(depth) // 4] = np.nan
+    return replace(view, depth=depth)
 
 
 def test_what_is_out_of_focus_is_not_acted_on(policy, wanted):

@@ -6,6 +6,7 @@ import pytest
 from imop.geometry import se3
 from imop.geometry.cloud import concatenate
 from imop.policy.proposals import (
+    ROUND,
     Matches,
     all_turns,
     equal_turns,
@@ -106,6 +107,16 @@ def test_every_turn_of_a_can_leaves_it_where_it_is():
     assert len(turns) == TURNS and onto(cloud.points[::5], cloud.points, turns).min() > 0.8
     away = np.degrees(se3.rotation_distance(turns, np.eye(4))).round()
     assert sorted(away) == sorted(min(15.0 * k, 360.0 - 15.0 * k) for k in range(TURNS))
+
+
+def test_most_turns_are_enough_to_be_round():
+    """Of what was seen from one side, some turns show the side that was not."""
+    cloud = can()
+    turns = equal_turns(cloud)
+    for kept in ([0, 1, 2, 4, 7], [0, 1, 2, 6, 7]):
+        found = all_turns(turns[kept], TURNS)
+        assert len(found) == TURNS and onto(cloud.points[::5], cloud.points, found).min() > 0.8
+    assert len(all_turns(turns[: ROUND - 1], TURNS)) == ROUND - 1
 
 
 def test_what_is_not_round_has_no_other_turns():

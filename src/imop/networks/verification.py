@@ -30,6 +30,7 @@ EVIDENCE = (
     ),
     *(f"context_{name}" for name in ("loose", "color", "absent")),
     "pattern",
+    "claimed",
     *(f"backward_{name}" for name in ("exact", "color", "clash", "size")),
     *(f"around_{name}" for name in ("forward", "backward")),
     *(f"matches_{name}" for name in ("asked", "sure", "tight", "loose", "near")),
@@ -38,11 +39,12 @@ EVIDENCE = (
     "palette",
     "apart",
     *("wrist", "palm", "fingers"),
+    *("turned_exact", "turned_color", "turned_pattern"),
 )
 """What is known of a candidate on its own."""
 FOR = ("exact", "loose", "color", "tight", "matches_near", "forward", "around_backward", "pattern")
 """Endings of the names of evidence that speaks for a candidate, the more of it there is."""
-AGAINST = ("clash", "absent", "wrist", "palm", "fingers")
+AGAINST = ("clash", "absent", "claimed", "wrist", "palm", "fingers")
 """The same of what speaks against it. What has neither ending describes the situation, or may mean either."""
 
 # A rival is not farther behind than this, in scores; where there is none, that far.

@@ -18,7 +18,7 @@ from imop.policy.contacts import SAME
 from imop.policy.interfaces import PolicyConfig
 from imop.policy.region import Goal, Region, fading
 from imop.policy.target import BESIDE, OFFSET, SHADE, Explained, Surface, shades
-from imop.types import CameraView, FloatArray
+from imop.types import CameraView, Float32Array, FloatArray
 
 # Observed points this near to the moved region, metres, have to be explained by it.
 AROUND = 0.04
@@ -47,6 +47,7 @@ class Template:
         config: says how many points are compared.
         payload: what the hand takes next, if that is less than the region.
         goal: what stands where the action goes, if that is not the region.
+        others: (N, 3) colours of all else that stands in the demonstrated scene.
 
     Attributes:
         cloud: points of the region, `size` of them, then of its context, then of the goal.
@@ -67,17 +68,18 @@ class Template:
         config: PolicyConfig,
         payload: PointCloud | None = None,
         goal: Goal | None = None,
+        others: Float32Array | None = None,
     ) -> None:
-        own, others, self.backward = config.compared
+        own, few, self.backward = config.compared
         chosen = farthest_points(region.cloud.points, own)
         parts = [region.cloud.select(chosen)]
         weights = [_weights(region, chosen, p_goal, payload, goal is None)]
         looks = [np.arange(len(chosen)) < config.glanced[0]]
         for column, cloud, weight in _beyond(region, goal):
-            few = farthest_points(cloud.points, others)
-            parts.append(cloud.select(few))
-            weights.append(weight[few, None] * np.eye(6)[column])
-            looks.append(np.arange(len(few)) < config.glanced[1])
+            some = farthest_points(cloud.points, few)
+            parts.append(cloud.select(some))
+            weights.append(weight[some, None] * np.eye(6)[column])
+            looks.append(np.arange(len(some)) < config.glanced[1])
         self.cloud, self.weights = concatenate(parts), np.concatenate(weights)
         self.hue = shades(self.cloud.colors)
         self.spread = np.full(len(self.cloud), OFFSET)
@@ -85,7 +87,17 @@ class Template:
         self.size, self.marks = len(chosen), float(self.hue[: len(chosen)].var(axis=0).sum())
         self.glance = np.flatnonzero(np.concatenate(looks))
         self.whole, self.beside = Surface(region.whole, views), Surface(beside, views)
-        self.p_goal = p_goal
+        self.p_goal, self._hues = p_goal, cKDTree(self.hue[: self.size])
+        self._others: cKDTree | None = None
+        if others is not None and len(others):
+            self._others = cKDTree(shades(others[:: max(1, len(others) // own)]))
+
+    def claimed(self, found: FloatArray) -> FloatArray:
+        """(...,) by how much shades (..., 4) look more like something else that was shown, 0 .. 1."""
+        if self._others is None:
+            return np.zeros(found.shape[:-1])
+        other, own = (_alike(tree, found) for tree in (self._others, self._hues))
+        return np.asarray(np.maximum(other - own, 0.0))
 
     def moved(self, T: FloatArray, which: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
         """Points (H * M, 3) and normals after each of motions (H, 4, 4), one after the other."""
@@ -138,7 +150,7 @@ def glance(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
 
 
 def shares(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
-    """(H, 40) what `networks.verification.EVIDENCE` names first: forward, context, backward, around."""
+    """(H, 41) what `networks.verification.EVIDENCE` names first: forward, context, backward, around."""
     H, which = len(T), np.arange(len(template.cloud))
     points, normals = template.moved(T, which)
     found = surface.explain(points, normals, *_tiled(template, which, H))
@@ -155,24 +167,40 @@ def shares(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
     columns += [(absent * (1 - loose)) @ w / all_of_it]
     # What has no marks has no pattern either.
     telling = template.marks / (template.marks + NOISE)
-    columns += [telling * _paint(template, surface, found.index.reshape(H, -1), loose)]
+    index, own = found.index.reshape(H, -1)[:, : template.size], loose[:, : template.size]
+    columns += [telling * _paint(template, surface, index, own), _claimed(template, surface, index, own)]
     rows = np.stack([np.asarray(c) for c in columns], axis=1)
     backward = np.stack([_backward(template, surface, M) for M in T])
     return np.concatenate([rows, backward], axis=1)
 
 
-def painted(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
-    """(H,) how well the paint of the region lies, after motions (H, 4, 4), as it was shown; see `pattern`."""
-    which = np.arange(template.size)
+def looks(template: Template, surface: Surface, T: FloatArray, count: int) -> FloatArray:
+    """(H, 3) how motions (H, 4, 4) lay the region onto what was seen: shape, colours, and their pattern.
+
+    Only `count` of its points are compared.
+    """
+    which = np.arange(min(count, template.size))
     found = surface.explain(*template.moved(T, which), *_tiled(template, which, len(T)))
-    return _paint(template, surface, found.index.reshape(len(T), -1), found.loose.reshape(len(T), -1))
+    exact, loose, color = (v.reshape(len(T), -1) for v in (found.exact, found.loose, found.color))
+    w = template.weights[which, 0]
+    tinted = (loose * color) @ w / np.maximum(loose @ w, 1e-9)
+    paint = _paint(template, surface, found.index.reshape(len(T), -1), loose)
+    return np.stack([exact @ w / max(w.sum(), 1e-9), tinted, paint], axis=1)
 
 
 def _paint(template: Template, surface: Surface, index: NDArray[np.int64], loose: FloatArray) -> FloatArray:
-    """(H,) `pattern` of the region, whose counterparts come first among (H, M) and fit as well as `loose`."""
-    size = template.size
-    weight = loose[:, :size] * template.weights[:size, 0]
-    return pattern(template.hue[:size], surface.shades[index[:, :size]], weight)
+    """(H,) `pattern` of the first points of the region, with counterparts (H, M) that fit so well (H, M)."""
+    count = index.shape[1]
+    weight = loose * template.weights[:count, 0]
+    return pattern(template.hue[:count], surface.shades[index], weight)
+
+
+def _claimed(template: Template, surface: Surface, index: NDArray[np.int64], loose: FloatArray) -> FloatArray:
+    """(H,) how much the counterparts look like something else that was shown; see `Template.claimed`."""
+    weight = loose * template.weights[: template.size, 0]
+    seen, where = np.unique(index, return_inverse=True)
+    claims = template.claimed(surface.shades[seen])[where].reshape(index.shape)
+    return np.asarray((claims * weight).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-9))
 
 
 def palette(template: Template, surface: Surface) -> float:
@@ -180,8 +208,14 @@ def palette(template: Template, surface: Surface) -> float:
 
     Where they are, something in other colours is rather not meant; where they are not, it may be.
     """
-    away, _ = cKDTree(surface.shades[surface.sample]).query(template.hue[: template.size])
-    return float(np.average(np.exp(-0.5 * (away / SHADE) ** 2), weights=template.weights[: template.size, 0]))
+    there = _alike(cKDTree(surface.shades[surface.sample]), template.hue[: template.size])
+    return float(np.average(there, weights=template.weights[: template.size, 0]))
+
+
+def _alike(known: cKDTree, found: FloatArray) -> FloatArray:
+    """(...,) 0 .. 1 agreement of shades (..., 4) with the most similar known one."""
+    away = np.asarray(known.query(found)[0])
+    return np.asarray(np.exp(-0.5 * (away / SHADE) ** 2))
 
 
 def pattern(shown: FloatArray, found: FloatArray, weight: FloatArray) -> FloatArray:

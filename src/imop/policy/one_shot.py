@@ -4,9 +4,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from imop.errors import CorruptData, InvalidInput, NoConfidentMatch
 from imop.geometry import se3
 from imop.geometry.focus import Focus, in_focus
+from imop.geometry.memory import with_hidden
 from imop.geometry.perception import Perception
 from imop.geometry.view_alignment import corrected, find_errors
 from imop.networks.model import BUNDLED, load_model
@@ -60,6 +63,7 @@ class OneShotPolicy:
         self._cameras: set[str] = set()
         self._camera_errors: dict[str, FloatArray] = {}
         self._progress = BEGINNING
+        self._last: Scene | None = None
 
     @classmethod
     def from_pretrained(
@@ -122,7 +126,7 @@ class OneShotPolicy:
 
     def reset(self) -> None:
         """Begin a new episode."""
-        self._progress = BEGINNING
+        self._progress, self._last = BEGINNING, None
         self.router.reset()
 
     def act(self, observation: Observation, focus: Focus | None = None) -> Action:
@@ -144,16 +148,23 @@ class OneShotPolicy:
             raise InvalidInput(
                 "views", f"camera {missing[0]} is missing", f"all of {', '.join(sorted(self._cameras))}"
             )
-        query = self.see(observation, focus)
+        query = self.see(observation, focus, self._last)
         number, step = self.router.route(query)
         action = self.locate(query, step, number, self._progress)
         self.router.took(number, step)
         assert action.match is not None
-        self._progress = Progress(action.match.T_query_support)
+        self._progress, self._last = Progress(action.match.T_query_support), query
         return action
 
-    def see(self, observation: Observation, focus: Focus | None = None) -> Scene:
+    def see(
+        self, observation: Observation, focus: Focus | None = None, earlier: Scene | None = None
+    ) -> Scene:
         """An observation as the policy works on it: views brought together, fused, without the robot.
+
+        Args:
+            observation: what is seen.
+            focus: which thing is meant, if somebody says so.
+            earlier: what was seen before in this episode: of what is hidden now, it tells where it was.
 
         Raises:
             InvalidInput: if no depth was measured, or the focus does not fit the observation.
@@ -161,10 +172,16 @@ class OneShotPolicy:
         if self._perception.align_views:
             # A camera may have been knocked since; else the errors stay as they are.
             observation = corrected(observation, find_errors([observation], self._camera_errors))
-        return self._scene(observation, focus)
+        return self._scene(observation, focus, earlier)
 
-    def _scene(self, observation: Observation, focus: Focus | None = None) -> Scene:
+    def _scene(
+        self, observation: Observation, focus: Focus | None = None, earlier: Scene | None = None
+    ) -> Scene:
         cloud = self._perception.points(observation)
+        if earlier is not None:
+            way = np.stack([o.T_world_gripper[:3, 3] for o in (earlier.observation, observation)])
+            stood = earlier.fused.select(~earlier.ground.bare)
+            cloud = with_hidden(cloud, observation, stood, way, self._perception.robot_mask)
         return Scene(observation, cloud, None if focus is None else in_focus(focus, observation, cloud))
 
     def locate(

@@ -40,8 +40,8 @@ ALIKE, NEAR = 0.8, 0.006
 POINTS, OFF = 200, 0.008
 # The same of a half turn, and how many axes are refined.
 AXES, REFINED = 0.05, 4
-# What looks the same after all of the eight turns that are tried is round.
-ROUND = 8
+# What looks the same after so many of the eight turns that are tried is round, seen from one side.
+ROUND = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +155,7 @@ def all_turns(turns: FloatArray, count: int) -> FloatArray:
     if len(turns) < ROUND:
         return turns
     half = turns[np.argmin(turns[:, 0, 0])]
-    axis = np.array([*half[:2, 3] / 2, 0.0])
+    axis = np.append(np.linalg.solve(np.eye(2) - half[:2, :2], half[:2, 3]), 0.0)
     return upright_motions(axis, axis[None], count)
 
 

@@ -8,6 +8,8 @@ import numpy as np
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, farthest_points
 from imop.geometry.icp import SMALLEST, upright
+from imop.geometry.neighbours import within
+from imop.policy.contacts import SAME
 from imop.policy.evidence import Template
 from imop.policy.interfaces import BEGINNING, Candidate, Feasible, PolicyConfig, Progress, Scene, Transition
 from imop.policy.proposals import Asked, all_turns, equal_turns, half_turn, straightened, upright_motions
@@ -42,14 +44,19 @@ class StepSearch:
         views = tuple(before.observation.views.values())
         standing = before.cloud.select(~before.ground.bare)
         beside, goal = _beside(standing, T_goal, region, config), find_goal(step, region, config)
-        template = Template(region, T_goal[:3, 3], beside, views, config, payload, goal)
+        others = standing.colors[~within(standing.points, region.whole.points, SAME)]
+        template = Template(region, T_goal[:3, 3], beside, views, config, payload, goal, others)
         parts = _parts(region, payload, goal, T_goal[:3, 3], config)
         turns = equal_turns(region.cloud)
-        self.sought, self._ask = Sought(config, step, region, template, parts, turns, verifier), ask
+        self._half_turn = half_turn(thing_of(parts[0].coarse, standing.points))
+        # What is not round may be taken for itself half a turn round.
+        half = np.stack([np.eye(4), self._half_turn])
+        taken_for = all_turns(turns, config.among) if len(turns) > 1 else half
+        self.sought = Sought(config, step, region, template, parts, turns, taken_for, verifier)
+        self._ask = ask
         # All of it, what stays in place on another thing, and what is next to the gripper.
         self._precise = [part for part in parts if part.name in ("region", "firm", "part")]
         self._turns = all_turns(turns, config.painted)
-        self._half_turn = half_turn(thing_of(parts[0].coarse, standing.points))
         # What is around the goal is evidence, too.
         around_goal = np.zeros((0, 3)) if goal is None else goal.cloud.points
         self._concerned = np.concatenate([region.whole.points, around_goal, T_goal[None, :3, 3]])

@@ -15,9 +15,9 @@ from imop.geometry import se3
 from imop.geometry.icp import CLOSE, FINEST
 from imop.geometry.ransac import distinct
 from imop.networks.verification import VerificationNetwork
-from imop.policy.evidence import Template, crowd, glance, painted, palette, shares
+from imop.policy.evidence import Template, crowd, glance, looks, palette, shares
 from imop.policy.interfaces import Candidate, PolicyConfig, Transition
-from imop.policy.proposals import Asked, Matches
+from imop.policy.proposals import ROUND, Asked, Matches
 from imop.policy.region import Region
 from imop.policy.target import REACH, Target, obstacles
 from imop.types import BoolArray, FloatArray
@@ -26,6 +26,10 @@ from imop.types import BoolArray, FloatArray
 ELSEWHERE = (0.02, 0.26)
 # A point that is explained by more than this has a counterpart.
 FOUND = 0.3
+# Motions that take the region to one place, upright alike, have the same turns: metres and cosine.
+PLACE = (0.005, 0.996)
+# Turns that differ by no more than this look the same.
+FAINT = 0.01
 
 
 class Verifier:
@@ -80,6 +84,7 @@ class Sought:
         template: the same, ready to be compared.
         parts: of the region: all of it, what stays in place, then what else is looked for on its own.
         turns: (S, 4, 4) after which the region looks the same.
+        taken_for: (R, 4, 4) all turns that the region may be taken for another one in; one is none.
         verifier: gives probabilities.
     """
 
@@ -89,6 +94,7 @@ class Sought:
     template: Template
     parts: tuple[Part, ...]
     turns: FloatArray
+    taken_for: FloatArray
     verifier: Verifier
 
     @property
@@ -137,6 +143,7 @@ class Pool:
         self.motions: list[FloatArray] = []
         self.generators: list[str] = []
         self._rows: list[FloatArray] = []
+        self._places: list[tuple[FloatArray, FloatArray]] = []
         self._probabilities = np.zeros(0)
 
     def moved(self, part: Part, T: FloatArray) -> FloatArray:
@@ -163,10 +170,11 @@ class Pool:
     def as_painted(self, T: FloatArray) -> FloatArray:
         """Those few of motions (H, 4, 4), each a small turn after the one before, that fit the paint best.
 
-        That is after which colours lie most as they were shown, whatever they are now. Neighbours of a better
-        one are left out.
+        That is where colours, and their pattern whatever they are now, lie most as they were shown.
+        Neighbours of a better one are left out.
         """
-        fits = painted(self._sought.template, self.target.surface, T)
+        values = looks(self._sought.template, self.target.surface, T, self._sought.template.size)
+        fits = ((values - values.mean(axis=0)) / (values.std(axis=0) + FAINT))[:, 1:].sum(axis=1)
         beside = np.stack([np.roll(fits, k) for k in (-2, -1, 1, 2)])
         peaks = np.flatnonzero(fits >= beside.max(axis=0))
         order = np.argsort(-fits[peaks], kind="stable")
@@ -251,7 +259,30 @@ class Pool:
         others = self._support(T), self._poses(T), self._situation(len(T))
         # More in the hand's way than was shown.
         crowded = crowd(self._obstacles, T @ sought.T_goal) - sought.crowd
-        return np.concatenate([first, *others, crowded], axis=1)
+        return np.concatenate([first, *others, crowded, self._turned(T)], axis=1)
+
+    def _turned(self, T: FloatArray) -> FloatArray:
+        """(H, 3) how far motions (H, 4, 4) stand out among all turns of them, in standard deviations.
+
+        Where a faint mark lies says little of where the region is, but much of its turn.
+        """
+        sought, surface = self._sought, self.target.surface
+        own = looks(sought.template, surface, T, sought.config.turned)
+        usual = np.stack([self._among_turns(motion) for motion in T])
+        return np.asarray((own - usual[:, 0]) / (usual[:, 1] + FAINT))
+
+    def _among_turns(self, T: FloatArray) -> FloatArray:
+        """(2, 3) mean and standard deviation of `evidence.looks` over all turns after a motion (4, 4)."""
+        sought = self._sought
+        place = np.append(se3.apply(T, sought.center[None])[0], T[:3, 2])
+        round_one = len(sought.taken_for) >= ROUND
+        for known, usual in self._places if round_one else ():
+            if np.linalg.norm(place[:3] - known[:3]) < PLACE[0] and place[3:] @ known[3:] > PLACE[1]:
+                return usual
+        values = looks(sought.template, self.target.surface, T @ sought.taken_for, sought.config.turned)
+        usual = np.stack([values.mean(axis=0), values.std(axis=0)])
+        self._places.append((place, usual))
+        return usual
 
     def _support(self, T: FloatArray) -> FloatArray:
         """(H, 5) what the matches say, in any of the turns of equal shape."""

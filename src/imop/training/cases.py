@@ -189,6 +189,7 @@ class CasesConfig:
         seed: of everything that is drawn.
         weights: folder of the networks that search.
         mix: shares of cases with the same things, others in colour, in shape, in both.
+        kinds: of what is done in procedural ones (`plans.SHARES`); all if none is named.
         store: of recorded demonstrations that the cases are of, instead of procedural ones.
         others: share of those whose query shows other objects than the demonstration.
         jobs: processes.
@@ -199,6 +200,7 @@ class CasesConfig:
     seed: int = 0
     weights: Path = BUNDLED
     mix: tuple[float, float, float, float] = (0.35, 0.1, 0.25, 0.3)
+    kinds: tuple[str, ...] = ()
     store: Path | None = None
     others: float = 0.0
     jobs: int = 1
@@ -206,7 +208,7 @@ class CasesConfig:
 
 def _executions(config: CasesConfig, seed: int, rng: np.random.Generator) -> Iterator[Execution]:
     if config.store is None:
-        return synthetic_executions(TRAINING, config.mix, seed, rng)
+        return synthetic_executions(TRAINING, config.mix, seed, rng, config.kinds)
     return recorded_executions(DemonstrationStore.open(config.store, verify=False), seed, config.others)
 
 
