@@ -182,7 +182,7 @@ def test_paint_tells_a_turn_before_its_colours_are_known(yaw):
     cloud, query = marked(RED, GREEN), moved(marked(GREEN, BLUE), at(0, 0, 0, yaw=yaw))
     template = Template(region(cloud), GOAL, cloud, (), PolicyConfig())
     turns = np.stack([at(0, 0, 0, yaw=yaw), at(0, 0, 0, yaw=yaw + np.pi)])
-    right, other = looks(template, Surface(query, ()), turns, template.size)
+    right, other = looks(template, Surface(query, ()), turns)
     assert right[2] > other[2] + 0.2
 
 
@@ -190,7 +190,7 @@ def test_shape_and_colours_look_right_where_they_are():
     cloud = marked(RED, GREEN)
     template = Template(region(cloud), GOAL, cloud, (), PolicyConfig())
     motions = np.stack([np.eye(4), at(0, 0, 0, yaw=np.pi), at(0.03, 0, 0)])
-    right, turned, off = looks(template, Surface(cloud, ()), motions, 200)
+    right, turned, off = looks(template, Surface(cloud, ()), motions)
     assert right[0] > 0.99 > turned[0] > 0.75 > off[0]
     assert right[1] > 0.99 > 0.8 > turned[1]
 

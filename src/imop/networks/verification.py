@@ -10,6 +10,7 @@ Each candidate is scored on its own first. Then its scores are set beside the be
 beside the best of its rivals, which act somewhere else: what that is worth is learned as well.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import torch
@@ -96,6 +97,17 @@ class VerificationNetwork(nn.Module):
         x[real] = self.standardized(evidence[real])
         return torch.stack([member(x, rival, real) for member in self.members])
 
+    def entering(self, names: Collection[str]) -> list[tuple[nn.Parameter, Tensor]]:
+        """The parameters through which some evidence enters, each with a mask of the same shape, 1 where."""
+        found = []
+        for member in (m for m in self.members if isinstance(m, _Member)):
+            for parameter, inputs in member.first():
+                wanted = [EVIDENCE[int(i)] in names for i in inputs]
+                mask = torch.zeros_like(parameter)
+                mask[:, : len(wanted)] = torch.tensor(wanted).to(mask)
+                found.append((parameter, mask))
+        return found
+
     def probability(self, evidence: Tensor, rival: Tensor) -> Tensor:
         """(H,) of being right, of one case's candidates with evidence (H, |EVIDENCE|) and rivals (H, H)."""
         real = torch.ones(1, len(evidence), dtype=torch.bool)
@@ -125,6 +137,13 @@ class _Member(nn.Module):
         )
         self.alone = _Monotone(len(directed), config.width, config.scores, between)
         self.beside = _Monotone(len(directed) + 3 * config.scores, config.width, 1, between)
+
+    def first(self) -> list[tuple[nn.Parameter, Tensor]]:
+        """The weights (W, I) of each first layer, with the columns of the evidence that come first in I."""
+        entry = self.situation[0].weight
+        assert isinstance(entry, nn.Parameter)
+        known = ((layers.weights[0], self.directed) for layers in (self.alone, self.beside))
+        return [(entry, self.free), *known]
 
     def forward(self, x: Tensor, rival: Tensor, real: Tensor) -> Tensor:
         """Logits (B, H) of standardized evidence (B, H, |EVIDENCE|)."""

@@ -23,8 +23,8 @@ from imop.types import CameraView, Float32Array, FloatArray
 # Observed points this near to the moved region, metres, have to be explained by it.
 AROUND = 0.04
 # Colours that agree less than this contradict each other. What their pattern explains is told from noise of
-# this variance.
-CLASH, NOISE = 0.1, 0.02
+# this variance. Marks that vary less than this are taken to have kept their colours.
+CLASH, NOISE, FAINT = 0.1, 0.02, 0.01
 # Boxes around wrist, palm and fingers of a parallel gripper, after the Panda's: lower and upper corner,
 # gripper frame, metres.
 HAND = np.array(
@@ -174,12 +174,9 @@ def shares(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
     return np.concatenate([rows, backward], axis=1)
 
 
-def looks(template: Template, surface: Surface, T: FloatArray, count: int) -> FloatArray:
-    """(H, 3) how motions (H, 4, 4) lay the region onto what was seen: shape, colours, and their pattern.
-
-    Only `count` of its points are compared.
-    """
-    which = np.arange(min(count, template.size))
+def looks(template: Template, surface: Surface, T: FloatArray) -> FloatArray:
+    """(H, 3) how motions (H, 4, 4) lay the region onto what was seen: shape, colours, and their pattern."""
+    which = np.arange(template.size)
     found = surface.explain(*template.moved(T, which), *_tiled(template, which, len(T)))
     exact, loose, color = (v.reshape(len(T), -1) for v in (found.exact, found.loose, found.color))
     w = template.weights[which, 0]
@@ -189,10 +186,9 @@ def looks(template: Template, surface: Surface, T: FloatArray, count: int) -> Fl
 
 
 def _paint(template: Template, surface: Surface, index: NDArray[np.int64], loose: FloatArray) -> FloatArray:
-    """(H,) `pattern` of the first points of the region, with counterparts (H, M) that fit so well (H, M)."""
-    count = index.shape[1]
-    weight = loose * template.weights[:count, 0]
-    return pattern(template.hue[:count], surface.shades[index], weight)
+    """(H,) `pattern` of the region, whose counterparts are (H, M) and fit as well as `loose` (H, M)."""
+    weight = loose * template.weights[: template.size, 0]
+    return pattern(template.hue[: template.size], surface.shades[index], weight)
 
 
 def _claimed(template: Template, surface: Surface, index: NDArray[np.int64], loose: FloatArray) -> FloatArray:
@@ -221,7 +217,8 @@ def _alike(known: cKDTree, found: FloatArray) -> FloatArray:
 def pattern(shown: FloatArray, found: FloatArray, weight: FloatArray) -> FloatArray:
     """(H,) share of the variance of the colours found that a linear map of the colours shown explains.
 
-    It tells whether marks lie where they were shown, whatever their colours are now.
+    It tells whether marks lie where they were shown, whatever their colours are now. For faint ones the map
+    can hardly be known; it is taken to be about the identity, as if colours had stayed but for the light.
 
     Args:
         shown: (M, 4) shades of the region.
@@ -229,12 +226,13 @@ def pattern(shown: FloatArray, found: FloatArray, weight: FloatArray) -> FloatAr
         weight: (H, M) of the points.
     """
     w = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-9)
-    A = np.concatenate([shown, np.ones((len(shown), 1))], axis=1)
-    G = np.einsum("hm,mi,mj->hij", w, A, A) + 1e-4 * np.eye(A.shape[1])
-    B = np.linalg.solve(G, np.einsum("hm,mi,hmk->hik", w, A, found))
-    mean = np.einsum("hm,hmk->hk", w, found)
-    total = np.einsum("hm,hmk->h", w, (found - mean[:, None]) ** 2)
-    rest = np.einsum("hm,hmk->h", w, (found - A @ B) ** 2)
+    x = shown - np.einsum("hm,mi->hi", w, shown)[:, None]
+    y = found - np.einsum("hm,hmk->hk", w, found)[:, None]
+    prior = FAINT * np.eye(shown.shape[1])
+    G = np.einsum("hm,hmi,hmj->hij", w, x, x) + prior
+    B = np.linalg.solve(G, np.einsum("hm,hmi,hmk->hik", w, x, y) + prior)
+    total = np.einsum("hm,hmk->h", w, y**2)
+    rest = np.einsum("hm,hmk->h", w, (y - x @ B) ** 2)
     return np.asarray((total - rest) / (total + NOISE))
 
 

@@ -35,7 +35,7 @@ class PolicyConfig:
         samples: triples that are drawn from the matches.
         turns, places: upright turns of one place, and how many things the region is set upright on.
         painted: turns of something round of which its paint chooses; closest points cannot turn it.
-        among, turned: a turn of something round is seen beside so many others, on so many points.
+        among: a turn of something round is seen beside so many others.
         tight, loose: matches nearer than this to where a motion carries them speak for it, metres.
         next_to: what of the region is this near to where the gripper goes is a part of its own, metres.
         same_motion: motions nearer to each other than this, metres and radians, are judged once.
@@ -70,7 +70,6 @@ class PolicyConfig:
     places: int = 2
     painted: int = 72
     among: int = 24
-    turned: int = 200
     tight: float = 0.015
     loose: float = 0.03
     next_to: float = 0.05

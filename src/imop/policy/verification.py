@@ -26,10 +26,10 @@ from imop.types import BoolArray, FloatArray
 ELSEWHERE = (0.02, 0.26)
 # A point that is explained by more than this has a counterpart.
 FOUND = 0.3
-# Motions that take the region to one place, upright alike, have the same turns: metres and cosine.
-PLACE = (0.005, 0.996)
+# Motions that take the region to about one place, about as upright, turn it: metres and cosine.
+PLACE = (0.02, 0.97)
 # Turns that differ by no more than this look the same.
-FAINT = 0.01
+ALIKE = 0.01
 
 
 class Verifier:
@@ -173,8 +173,8 @@ class Pool:
         That is where colours, and their pattern whatever they are now, lie most as they were shown.
         Neighbours of a better one are left out.
         """
-        values = looks(self._sought.template, self.target.surface, T, self._sought.template.size)
-        fits = ((values - values.mean(axis=0)) / (values.std(axis=0) + FAINT))[:, 1:].sum(axis=1)
+        values = looks(self._sought.template, self.target.surface, T)
+        fits = ((values - values.mean(axis=0)) / (values.std(axis=0) + ALIKE))[:, 1:].sum(axis=1)
         beside = np.stack([np.roll(fits, k) for k in (-2, -1, 1, 2)])
         peaks = np.flatnonzero(fits >= beside.max(axis=0))
         order = np.argsort(-fits[peaks], kind="stable")
@@ -267,9 +267,9 @@ class Pool:
         Where a faint mark lies says little of where the region is, but much of its turn.
         """
         sought, surface = self._sought, self.target.surface
-        own = looks(sought.template, surface, T, sought.config.turned)
+        own = looks(sought.template, surface, T)
         usual = np.stack([self._among_turns(motion) for motion in T])
-        return np.asarray((own - usual[:, 0]) / (usual[:, 1] + FAINT))
+        return np.asarray((own - usual[:, 0]) / (usual[:, 1] + ALIKE))
 
     def _among_turns(self, T: FloatArray) -> FloatArray:
         """(2, 3) mean and standard deviation of `evidence.looks` over all turns after a motion (4, 4)."""
@@ -279,7 +279,7 @@ class Pool:
         for known, usual in self._places if round_one else ():
             if np.linalg.norm(place[:3] - known[:3]) < PLACE[0] and place[3:] @ known[3:] > PLACE[1]:
                 return usual
-        values = looks(sought.template, self.target.surface, T @ sought.taken_for, sought.config.turned)
+        values = looks(sought.template, self.target.surface, T @ sought.taken_for)
         usual = np.stack([values.mean(axis=0), values.std(axis=0)])
         self._places.append((place, usual))
         return usual

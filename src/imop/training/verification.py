@@ -6,7 +6,7 @@ python -m imop.training.verification --cases DIR [DIR ...] --weights FOLDER --ou
 import json
 import shlex
 import sys
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,12 +14,12 @@ import numpy as np
 import torch
 import tyro
 from numpy.typing import NDArray
-from torch import Tensor
+from torch import Tensor, nn
 from torch.nn import functional as F
 from torch.nn.utils.rnn import pad_sequence
 
 from imop.networks.model import BUNDLED, CARD, load_model, save_model
-from imop.networks.verification import VerificationNetwork
+from imop.networks.verification import EVIDENCE, VerificationNetwork
 from imop.policy.verification import rivals
 from imop.training.cases import Cases, read_cases
 from imop.types import FloatArray
@@ -41,6 +41,7 @@ class VerificationTraining:
         out: folder of the weights, with all other networks as they were.
         weights: folder of the other networks.
         further: whether the verification network of that folder is trained on, instead of a fresh one.
+        only: evidence that is new to it: nothing is trained but how it enters the network.
         held: share of the cases that are kept for the report.
         steps: of AdamW.
         batch: candidates' cases per step.
@@ -54,6 +55,7 @@ class VerificationTraining:
     out: Path
     weights: Path = BUNDLED
     further: bool = False
+    only: tuple[str, ...] = ()
     held: float = 0.15
     steps: int = 2000
     batch: int = 64
@@ -126,21 +128,39 @@ def fit(network: VerificationNetwork, cases: Cases, config: VerificationTraining
     known = np.unique(cases.case)
     held = set(known[-max(1, round(config.held * len(known))) :].tolist())
     train, test = Grouped(cases, set(known.tolist()) - held), Grouped(cases, held)
-    optimizer = torch.optim.AdamW(
-        network.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
-    )
+    network.train(not config.only)
+    entrance = _entrance(network, config.only, cases) if config.only else []
+    trained = [parameter for parameter, _ in entrance] or list(network.parameters())
+    decay = 0.0 if config.only else config.weight_decay
+    optimizer = torch.optim.AdamW(trained, lr=config.learning_rate, weight_decay=decay)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, config.learning_rate, config.steps)
-    network.train()
     for _ in range(config.steps):
         evidence, rival, off, real = train.take(rng.integers(len(train), size=config.batch).tolist())
         dropped = torch.rand_like(evidence) < config.dropout
         optimizer.zero_grad()
         opinions = network(torch.where(dropped, torch.nan, evidence), rival, real)
         torch.autograd.backward(torch.stack([loss(logits, off, real) for logits in opinions]).sum())
+        for parameter, new in entrance:
+            assert parameter.grad is not None
+            parameter.grad *= new
         optimizer.step()
         schedule.step()
     network.eval()
     return {**measure(network, test), "cases": float(len(train))}
+
+
+def _entrance(
+    network: VerificationNetwork, names: Collection[str], cases: Cases
+) -> list[tuple[nn.Parameter, Tensor]]:
+    """The parameters through which evidence of these names enters, each with a mask, 1 where it does.
+
+    What is usual of that evidence is taken from the cases at once.
+    """
+    new = [i for i, name in enumerate(EVIDENCE) if name in names]
+    values = torch.from_numpy(cases.evidence[:, new])
+    network.standardized.mean[new] = values.nanmean(dim=0)
+    network.standardized.square[new] = values.square().nanmean(dim=0)
+    return network.entering(names)
 
 
 def measure(network: VerificationNetwork, cases: Grouped) -> dict[str, float]:
