@@ -281,7 +281,8 @@ class Pool:
                 return usual
         values = looks(sought.template, self.target.surface, T @ sought.taken_for)
         usual = np.stack([values.mean(axis=0), values.std(axis=0)])
-        self._places.append((place, usual))
+        if round_one:
+            self._places.append((place, usual))
         return usual
 
     def _support(self, T: FloatArray) -> FloatArray:

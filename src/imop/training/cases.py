@@ -29,6 +29,7 @@ from imop.policy.learned import LearnedMatcher
 from imop.policy.registration import RegistrationMatcher
 from imop.policy.verification import Pool
 from imop.training.families import TRAINING
+from imop.training.plans import check_kinds
 from imop.training.recorded import recorded_executions
 from imop.training.set_up import SetUp
 from imop.training.synthetic import synthetic_executions
@@ -226,6 +227,7 @@ def _file(config: CasesConfig, number: int) -> None:
 def main() -> None:
     """Command line."""
     config = tyro.cli(CasesConfig, description=__doc__)
+    check_kinds(config.kinds)
     config.out.mkdir(parents=True, exist_ok=True)
     files = -(-config.cases // _PER_FILE)
     Parallel(n_jobs=config.jobs)(delayed(_file)(config, number) for number in range(files))
