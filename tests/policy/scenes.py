@@ -37,6 +37,20 @@ def moved(cloud, T):
     )
 
 
+def marked_can(mark_yaw, T):
+    """A grey can with a dark strip on its top, along its x axis turned by `mark_yaw`."""
+    rng = np.random.default_rng(0)
+    angle = rng.uniform(0, 2 * np.pi, 3000)
+    out = np.stack([np.cos(angle), np.sin(angle), np.zeros(3000)], axis=1)
+    wall = 0.03 * out + rng.uniform(0, 0.05, (3000, 1)) * [0, 0, 1]
+    top = out[:1500] * 0.03 * np.sqrt(rng.uniform(0, 1, (1500, 1))) + [0, 0, 0.05]
+    strip = np.abs(top @ [-np.sin(mark_yaw), np.cos(mark_yaw), 0]) < 0.004
+    parts = [colored(wall, out, GREY)]
+    for those, color in ((~strip, GREY), (strip, (0.2, 0.2, 0.2))):
+        parts.append(colored(top[those], np.tile([0.0, 0, 1], (those.sum(), 1)), color))
+    return moved(concatenate(parts), T)
+
+
 def table():
     grid = np.stack(np.meshgrid(np.arange(-0.2, 0.6, 0.01), np.arange(-0.4, 0.4, 0.01)), axis=-1)
     points = np.c_[grid.reshape(-1, 2), np.full(grid[..., 0].size, TABLE)]

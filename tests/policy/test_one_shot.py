@@ -12,9 +12,10 @@ from imop.geometry.focus import Focus
 from imop.geometry.neighbours import nearest
 from imop.geometry.view_alignment import corrected, find_errors
 from imop.networks.model import Model, ModelConfig, save_model
-from imop.policy.one_shot import OneShotPolicy
+from imop.policy.one_shot import CLEARANCE, OneShotPolicy, above_ground
 from imop.policy.registration import RegistrationMatcher
 from imop.policy.router import AdvancingRouter, LearnedRouter
+from tests.policy.scenes import TABLE, above, scene, table, transitions
 
 
 def with_depth(observation, depth):
@@ -240,3 +241,24 @@ def test_routing_needs_a_trained_network(tmp_path):
     model.routing.standardized.batches += 1
     save_model(model, tmp_path, {})
     assert isinstance(OneShotPolicy.from_pretrained(tmp_path, routed=True).router, LearnedRouter)
+
+
+@pytest.mark.parametrize(
+    ("shown", "found", "kept"),
+    [
+        (0.01, 0.0, CLEARANCE),
+        (0.01, -0.01, CLEARANCE),
+        (0.002, -0.001, 0.002),
+        (0.01, 0.02, 0.02),
+        (0.002, 0.002, 0.002),
+        # Into a hole, and something else altogether.
+        (-0.02, -0.025, -0.025),
+        (0.01, -0.1, -0.1),
+    ],
+)
+def test_a_pose_is_not_lower_above_the_ground_than_it_may_be(shown, found, kept):
+    ground = scene([table()], above(0.1, 0.0, TABLE + 0.3))
+    action = above(0.1, 0.0, TABLE + shown), True
+    step = transitions([ground, ground], [action])[0]
+    lifted = above_ground(above(0.2, 0.1, TABLE + found), ground, step)
+    np.testing.assert_allclose(lifted, above(0.2, 0.1, TABLE + kept), atol=1e-4)

@@ -1,28 +1,21 @@
-"""What is proposed: what matches agree on, upright and straightened motions, turns that change nothing."""
+"""What is proposed: what matches agree on, upright and straightened motions, and turns by paint."""
 
 import numpy as np
 import pytest
 
 from imop.geometry import se3
-from imop.geometry.cloud import concatenate
-from imop.policy.proposals import (
-    ROUND,
-    Matches,
-    all_turns,
-    equal_turns,
-    half_turn,
-    onto,
-    straightened,
-    upright_motions,
-)
-from imop.policy.target import Target, middle
-from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, colored, scene
+from imop.geometry.cloud import concatenate, middle
+from imop.policy.evidence import Template
+from imop.policy.interfaces import PolicyConfig
+from imop.policy.proposals import Matches, Turns, straightened
+from imop.policy.region import Region
+from imop.policy.target import Surface, Target
+from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, marked_can, scene
 
 SIZE = (0.1, 0.05, 0.06)
 HERE, THERE = at(0.1, 0.1), at(0.3, -0.2, yaw=1.2)
 T = THERE @ se3.invert(HERE)
 CENTER = np.array([0.1, 0.1, TABLE])
-TURNS = 24
 
 
 @pytest.fixture
@@ -67,14 +60,6 @@ def test_without_matches_nothing_is_proposed(matches):
     assert len(none.upright(target, 1, 24, [middle(matches.x)])) == 0
 
 
-def test_upright_motions_take_the_centre_to_every_place():
-    places = np.array([[0.3, 0.1, 0.8], [0.0, -0.2, 0.9]])
-    motions = upright_motions(CENTER, places, TURNS)
-    moved = se3.apply(motions, CENTER[None])[:, 0]
-    np.testing.assert_allclose(moved, np.repeat(places, TURNS, axis=0), atol=1e-12)
-    np.testing.assert_allclose(motions[:, 2, 2], 1.0)
-
-
 def test_straightened_goes_to_the_same_place_in_the_other_turn():
     straight = at(0.5, 0.5, 0.1, yaw=0.3)
     moved = straightened(T, straight, CENTER)
@@ -82,69 +67,41 @@ def test_straightened_goes_to_the_same_place_in_the_other_turn():
     np.testing.assert_allclose(moved[:3, :3], straight[:3, :3])
 
 
-def can(radius=0.04, height=0.08, spacing=0.004):
-    rng = np.random.default_rng(0)
-    count = int(2 * np.pi * radius * height / spacing**2)
-    angle = rng.uniform(0, 2 * np.pi, count)
-    out = np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=1)
-    points = radius * out + rng.uniform(0, height, count)[:, None] * [0, 0, 1] + CENTER
-    return colored(points, out, RED)
+def turns(shown, seen, axis=HERE[:3, 3]):
+    """Which turn of `shown` is meant in a scene of `seen`."""
+    region = Region(shown, np.ones(len(shown)), np.zeros((0, 3)), spread=np.full(len(shown), 0.001))
+    template = Template(region, HERE[:3, 3], shown, (), PolicyConfig())
+    return Turns(template, Surface(seen, ()), axis, about(np.pi), PolicyConfig())
 
 
-def angles(cloud):
-    turns = equal_turns(cloud)
-    assert np.array_equal(turns[0], np.eye(4))
-    return np.degrees(se3.rotation_distance(turns, np.eye(4))).round()
+def about(angle):
+    """The turn about the axis of what stands at HERE."""
+    return HERE @ se3.make(se3.euler(z=angle)) @ se3.invert(HERE)
 
 
-def test_a_can_looks_the_same_in_every_turn():
-    assert len(angles(can())) == 8
+@pytest.mark.parametrize("yaw", [0.0, 0.53, 1.9])
+def test_the_best_turns_lay_a_mark_onto_itself(yaw):
+    found = turns(marked_can(0.0, HERE), marked_can(yaw, THERE)).best(T)
+    # The strip looks the same half a turn round.
+    away = se3.rotation_distance(np.stack(found), T @ about(yaw))
+    assert np.minimum(away, np.pi - away).min() < np.radians(2.0)
 
 
-def test_every_turn_of_a_can_leaves_it_where_it_is():
-    cloud = can()
-    turns = all_turns(equal_turns(cloud), TURNS)
-    assert len(turns) == TURNS and onto(cloud.points[::5], cloud.points, turns).min() > 0.8
-    away = np.degrees(se3.rotation_distance(turns, np.eye(4))).round()
-    assert sorted(away) == sorted(min(15.0 * k, 360.0 - 15.0 * k) for k in range(TURNS))
+@pytest.mark.parametrize("off", [-0.25, -0.1, 0.0, 0.2])
+def test_a_turn_nearby_lays_a_mark_onto_itself(off):
+    found = turns(marked_can(0.0, HERE), marked_can(0.4, THERE)).nearby(T @ about(0.4 + off))
+    assert se3.rotation_distance(found, T @ about(0.4)) < max(np.radians(3.0), 0.6 * abs(off))
+    np.testing.assert_allclose(se3.apply(found, CENTER[None])[0], THERE[:3, 3], atol=1e-9)
 
 
-def test_most_turns_are_enough_to_be_round():
-    """Of what was seen from one side, some turns show the side that was not."""
-    cloud = can()
-    turns = equal_turns(cloud)
-    for kept in ([0, 1, 2, 4, 7], [0, 1, 2, 6, 7]):
-        found = all_turns(turns[kept], TURNS)
-        assert len(found) == TURNS and onto(cloud.points[::5], cloud.points, found).min() > 0.8
-    assert len(all_turns(turns[: ROUND - 1], TURNS)) == ROUND - 1
+def test_what_closest_points_turn_is_turned_back():
+    turned = turns(marked_can(0.0, HERE), marked_can(0.4, THERE)).kept(T, T @ about(0.3))
+    np.testing.assert_allclose(turned, T, atol=1e-9)
 
 
-def test_what_is_not_round_has_no_other_turns():
-    turns = equal_turns(box((0.06, 0.06, 0.06), RED, HERE))
-    assert all_turns(turns, TURNS) is turns
-
-
-def test_a_cube_looks_the_same_in_four_turns():
-    assert sorted(angles(box((0.06, 0.06, 0.06), RED, HERE))) == [0, 90, 90, 180]
-
-
-@pytest.mark.parametrize("size", [(0.12, 0.03, 0.04), (0.2, 0.1, 0.02)])
-def test_half_a_turn_alone_is_not_trusted(size):
-    assert list(angles(box(size, RED, HERE))) == [0]
-
-
-@pytest.mark.parametrize("yaw", [0.0, 0.7, 2.0])
-def test_a_half_turn_goes_about_the_base_and_not_about_what_sticks_out(yaw):
-    rng = np.random.default_rng(0)
-    base = rng.uniform((-0.03, -0.1, 0), (0.03, 0.1, 0.03), (1500, 3))
-    spout = rng.uniform((0.03, -0.01, 0.02), (0.15, 0.01, 0.03), (200, 3))
-    T = at(0.2, 0.1, yaw=yaw)
-    S = half_turn(se3.apply(T, np.concatenate([base, spout])))
-    assert se3.rotation_distance(S, np.eye(4)) == pytest.approx(np.pi, abs=0.1)
-    middle = T[:3, 3]
-    assert np.linalg.norm((se3.apply(S, middle[None])[0] - middle)[:2]) < 0.01
-
-
-def test_any_thing_has_a_half_turn():
-    few = np.array([[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.02, 0.0]])
-    assert se3.rotation_distance(half_turn(few), np.eye(4)) == pytest.approx(np.pi)
+def test_without_an_axis_no_turn_is_chosen():
+    can = marked_can(0.0, HERE)
+    none = turns(can, can, axis=None)
+    assert none.best(T) == []
+    assert none.nearby(T) is T
+    assert none.kept(np.eye(4), T) is T

@@ -4,14 +4,23 @@ import numpy as np
 import torch
 
 from imop.geometry import se3
-from imop.geometry.cloud import concatenate
 from imop.networks.verification import EVIDENCE
 from imop.policy.interfaces import BEGINNING, PolicyConfig, Progress, Scene
 from imop.policy.proposals import Asked, Matches
 from imop.policy.region import Region
 from imop.policy.search import StepSearch
 from imop.policy.verification import Verifier
-from tests.policy.scenes import BLUE, GREY, RED, TABLE, above, at, box, colored, moved, scene, transitions
+from tests.policy.scenes import (
+    BLUE,
+    RED,
+    TABLE,
+    above,
+    at,
+    box,
+    marked_can,
+    scene,
+    transitions,
+)
 
 HOME = above(0.0, -0.3, 1.2)
 GRASP = above(0.1, 0.1, TABLE + 0.05)
@@ -145,26 +154,12 @@ def test_a_generator_that_is_left_out_proposes_nothing():
     assert "fit" in found and "fit" not in without and without
 
 
-def can(mark_yaw, T):
-    """A grey can with a dark strip on its top, along its x axis turned by `mark_yaw`."""
-    rng = np.random.default_rng(0)
-    angle = rng.uniform(0, 2 * np.pi, 3000)
-    out = np.stack([np.cos(angle), np.sin(angle), np.zeros(3000)], axis=1)
-    wall = 0.03 * out + rng.uniform(0, 0.05, (3000, 1)) * [0, 0, 1]
-    top = out[:1500] * 0.03 * np.sqrt(rng.uniform(0, 1, (1500, 1))) + [0, 0, 0.05]
-    strip = np.abs(top @ [-np.sin(mark_yaw), np.cos(mark_yaw), 0]) < 0.004
-    parts = [colored(wall, out, GREY)]
-    for those, color in ((~strip, GREY), (strip, (0.2, 0.2, 0.2))):
-        parts.append(colored(top[those], np.tile([0.0, 0, 1], (those.sum(), 1)), color))
-    return moved(concatenate(parts), T)
-
-
 def test_a_faint_mark_makes_its_turn_stand_out_among_all_turns():
-    shown, yaw = can(0.0, HERE), 0.9
+    shown, yaw = marked_can(0.0, HERE), 0.9
     region = Region(shown, np.ones(len(shown)), np.zeros((0, 3)), spread=np.full(len(shown), 0.001))
     step = transitions([scene([shown], HOME), scene([shown], GRASP)], [(GRASP, False)])[0]
     found = StepSearch(PolicyConfig(), step, region, None, Verifier(Exact()), lambda _: Asked({}, NOTHING))
-    *_, pool = found.pools(scene([can(yaw, THERE)], HOME), BEGINNING)
+    *_, pool = found.pools(scene([marked_can(yaw, THERE)], HOME), BEGINNING)
     turned = se3.rotation_distance(np.stack(pool.motions) @ HERE, THERE @ at(0, 0, 0, yaw=yaw))
     # A strip looks the same half a turn round.
     away = np.minimum(turned, np.pi - turned)

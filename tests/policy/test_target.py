@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from imop.geometry import se3
-from imop.geometry.cloud import concatenate
+from imop.geometry.cloud import concatenate, middle
 from imop.policy.interfaces import PolicyConfig
 from imop.policy.region import Region
-from imop.policy.target import Target, find_goal, middle, obstacles, thing_of
+from imop.policy.target import Target, find_goal, obstacles, thing_of
 from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, camera, scene, transitions
 
 SIZE = (0.1, 0.05, 0.06)

@@ -274,3 +274,9 @@ def fit_plane(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     center = points.mean(axis=0)
     offset = points - center
     return center, np.linalg.eigh(offset.T @ offset)[1][:, 0]
+
+
+def middle(points: FloatArray) -> FloatArray:
+    """Centre of the bounding box: which side was seen shifts it less than the mean."""
+    center: FloatArray = (points.min(axis=0) + points.max(axis=0)) / 2
+    return center

@@ -57,6 +57,7 @@ class Template:
         weights: (M, 6) of the region, near the gripper, of what stays in place, of what is taken, of the
             goal, of the context.
         marks: variance of the region's shades.
+        center: (3,) mean of the region's points.
     """
 
     def __init__(
@@ -87,6 +88,7 @@ class Template:
         self.size, self.marks = len(chosen), float(self.hue[: len(chosen)].var(axis=0).sum())
         self.glance = np.flatnonzero(np.concatenate(looks))
         self.whole, self.beside = Surface(region.whole, views), Surface(beside, views)
+        self.center = np.asarray(region.cloud.points.mean(axis=0))
         self.p_goal, self._hues = p_goal, cKDTree(self.hue[: self.size])
         self._others: cKDTree | None = None
         if others is not None and len(others):

@@ -26,6 +26,10 @@ from imop.policy.learned import LearnedMatcher
 from imop.policy.router import AdvancingRouter, LearnedRouter, Router
 from imop.types import Action, Demonstration, FloatArray, Match, Observation
 
+# The tip is kept this far above the ground, metres, if it was shown above it. What would be deeper in the
+# ground than the error of a pose is another motion, and left as it is.
+CLEARANCE, MISJUDGED = 0.003, 0.02
+
 
 class OneShotPolicy:
     """Transfers demonstrated poses by finding each step's region again: T_j = T_query_support T_i.
@@ -198,7 +202,8 @@ class OneShotPolicy:
         Raises:
             NoConfidentMatch: if the confidence is below `min_confidence`, or nothing was found.
         """
-        demonstrated = self._demonstrations[demonstration][step].action
+        shown = self._demonstrations[demonstration][step]
+        demonstrated = shown.action
         prepared = self._prepared[demonstration][step]
         candidates = prepared.locate(query, progress, self._feasible)
         best = candidates[0] if candidates else None
@@ -209,13 +214,27 @@ class OneShotPolicy:
             step, best.p_support, best.p_query, prepared.region, T, best.generator, best.probability
         )
         return Action(
-            se3.orthonormal(T @ demonstrated.T_world_gripper),
+            above_ground(se3.orthonormal(T @ demonstrated.T_world_gripper), query, shown),
             demonstrated.gripper_open,
             demonstrated.allow_collisions,
             best.probability,
             match,
             best.reachable,
         )
+
+
+def above_ground(T_world_gripper: FloatArray, query: Scene, shown: Transition) -> FloatArray:
+    """The pose (4, 4), lifted by what it is too near to the ground, if it was shown above the ground."""
+    here, there = query.ground.plane, shown.before.ground.plane
+    if here is None or there is None:
+        return T_world_gripper
+    height = float(here.height(T_world_gripper[None, :3, 3])[0])
+    height_shown = float(there.height(shown.action.T_world_gripper[None, :3, 3])[0])
+    missing = min(height_shown, CLEARANCE) - height
+    lifted = T_world_gripper.copy()
+    if height_shown > 0 and 0 < missing < MISJUDGED:
+        lifted[:3, 3] += missing * here.normal
+    return lifted
 
 
 def _focused(scenes: Sequence[Scene], demonstration: Demonstration, focus: Focus) -> list[Scene]:

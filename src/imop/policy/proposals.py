@@ -19,29 +19,28 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud, farthest_points
-from imop.geometry.icp import Refiner, upright
+from imop.geometry.cloud import middle
 from imop.geometry.neighbours import nearest, within
 from imop.geometry.ransac import agreement, sample_motions
+from imop.geometry.turns import peak, upright_motions
 from imop.policy.contacts import SAME
-from imop.policy.target import Target, middle
+from imop.policy.evidence import Template, looks
+from imop.policy.interfaces import PolicyConfig
+from imop.policy.target import Surface, Target
 from imop.types import FloatArray
 
 # Share of the matches that must lead to a thing for the region to be set upright on it.
 SOME = 0.1
-# Share of a thing that has to look the same after a turn, and how near that is, metres.
-ALIKE, NEAR = 0.8, 0.006
-# Points that are compared, and how far off the middle of what was seen the axis may be, metres.
-POINTS, OFF = 200, 0.008
-# The same of a half turn, and how many axes are refined.
-AXES, REFINED = 0.05, 4
-# What looks the same after so many of the eight turns that are tried is round, seen from one side.
-ROUND = 5
+# Motions that take the region to about one place, about as upright, turn it: metres and cosine.
+PLACE = (0.02, 0.97)
+# Turns whose looks differ by no more than this look the same.
+ALIKE = 0.01
+# Fine turns to each side that belong to one peak, and how far off the turn of a motion usually is, radians.
+BESIDE, OFF = 4, 0.35
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,68 +123,99 @@ def straightened(T: FloatArray, T_straight: FloatArray, p: FloatArray) -> FloatA
     return carried
 
 
-def upright_motions(center: FloatArray, places: FloatArray, turns: int) -> FloatArray:
-    """(P * turns, 4, 4) motions that carry `center` (3,) to places (P, 3), in all upright turns."""
-    yaw = np.linspace(0.0, 2 * np.pi, turns, endpoint=False)
-    R = np.tile(np.stack([se3.euler(z=float(angle)) for angle in yaw]), (len(places), 1, 1))
-    return se3.make(R, np.repeat(places, turns, axis=0) - R @ center)
+class Turns:
+    """Which turn of a region is meant: how shape, colours and their pattern lie in each, among all turns.
 
+    Where a faint mark lies says little of where the region is, but much of its turn. Closest points say
+    nothing of the turn of something round.
 
-def equal_turns(cloud: PointCloud) -> FloatArray:
-    """(S, 4, 4) turns about the vertical after which a region looks the same; the first is the identity.
-
-    Of round things the networks match any side to any. A lone half turn is not counted: front and back of
-    most things look alike from afar, and differ.
+    Args:
+        template: of the region.
+        surface: what was observed.
+        axis: (3,) a point of its axis, if it is round.
+        half: (4, 4) the turn that it may be mistaken in, if it is not.
+        config: how many turns are looked at.
     """
-    points, center = cloud.points, middle(cloud.points)
-    few, found = points[farthest_points(points, POINTS)], []
-    for angle in np.radians(np.arange(45.0, 360.0, 45.0)):
-        R = se3.euler(z=float(angle))
-        motions = np.stack([se3.make(R, center - R @ center + (x, y, 0.0)) for x, y in _around(OFF, 3)])
-        alike = onto(few, points, motions)
-        if alike.max() > ALIKE:
-            found.append((angle, motions[int(np.argmax(alike))]))
-    if all(np.isclose(angle, np.pi) for angle, _ in found):
-        found = []
-    return np.stack([np.eye(4), *(T for _, T in found)])
+
+    def __init__(
+        self,
+        template: Template,
+        surface: Surface,
+        axis: FloatArray | None,
+        half: FloatArray,
+        config: PolicyConfig,
+    ) -> None:
+        self._template, self._surface, self._axis, self._config = template, surface, axis, config
+        self._some = np.stack([np.eye(4), half]) if axis is None else _about(axis, config.among)
+        self._places: list[tuple[FloatArray, FloatArray]] = []
+
+    def stand_out(self, T: FloatArray) -> FloatArray:
+        """(H, 3) how far looks of motions (H, 4, 4) are above those of all turns, in standard deviations."""
+        usual = np.stack([self._usual(motion) for motion in T])
+        return _deviations(self._looks(T), usual[:, 0], usual[:, 1])
+
+    def best(self, T: FloatArray) -> list[FloatArray]:
+        """The turns of a motion (4, 4) of something round that fit best, likeliest first."""
+        if self._axis is None:
+            return []
+        angles, fits = self._fits(T)
+        beside = np.stack([np.roll(fits, k) for k in (-2, -1, 1, 2)])
+        peaks = np.flatnonzero(fits >= beside.max(axis=0))
+        best = peaks[np.argsort(-fits[peaks], kind="stable")][: self._config.tried]
+        return [self._turned(T, self._peak(angles, fits, k)) for k in best]
+
+    def nearby(self, T: FloatArray) -> FloatArray:
+        """The turn of a motion (4, 4) of something round that fits best among those nearby."""
+        if self._axis is None:
+            return T
+        angles, fits = self._fits(T)
+        near = np.arange(-BESIDE, BESIDE + 1)
+        likely = fits - 0.5 * (np.minimum(angles, 2 * np.pi - angles) / OFF) ** 2
+        return self._turned(T, self._peak(angles, likely, near[likely[near].argmax()]))
+
+    def kept(self, T: FloatArray, T_laid: FloatArray) -> FloatArray:
+        """The motion `T_laid` (4, 4) next to `T`, turned as `T` is."""
+        if self._axis is None:
+            return T_laid
+        R = se3.invert(T)[:3, :3] @ T_laid[:3, :3]
+        return self._turned(T_laid, -float(np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])))
+
+    def _fits(self, T: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(N,) angles, and how well something round fits after a motion (4, 4) and each of them."""
+        assert self._axis is not None
+        values = self._looks(T @ _about(self._axis, self._config.painted))
+        angles = np.linspace(0.0, 2 * np.pi, len(values), endpoint=False)
+        return angles, _deviations(values, values.mean(axis=0), values.std(axis=0)).sum(axis=1)
+
+    def _peak(self, angles: FloatArray, fits: FloatArray, k: int) -> float:
+        """The angle at which `fits` (N,) at `angles` (N,) of a full turn are highest next to the k-th."""
+        near = np.arange(-BESIDE, BESIDE + 1)
+        return float(angles[k] + peak(near * angles[1], fits[(k + near) % len(fits)]))
+
+    def _turned(self, T: FloatArray, angle: float) -> FloatArray:
+        assert self._axis is not None
+        R = se3.euler(z=angle)
+        return np.asarray(T @ se3.make(R, self._axis - R @ self._axis))
+
+    def _looks(self, T: FloatArray) -> FloatArray:
+        return looks(self._template, self._surface, T)
+
+    def _usual(self, T: FloatArray) -> FloatArray:
+        """(2, 3) mean and standard deviation of the looks of all turns of a motion (4, 4)."""
+        place = np.append(se3.apply(T, self._template.center[None])[0], T[:3, 2])
+        for known, usual in self._places if self._axis is not None else ():
+            if np.linalg.norm(place[:3] - known[:3]) < PLACE[0] and place[3:] @ known[3:] > PLACE[1]:
+                return usual
+        values = self._looks(T @ self._some)
+        usual = np.stack([values.mean(axis=0), values.std(axis=0)])
+        self._places.append((place, usual))
+        return usual
 
 
-def all_turns(turns: FloatArray, count: int) -> FloatArray:
-    """(count, 4, 4) turns about the axis of equal `turns` (S, 4, 4); the same turns if it is not round."""
-    if len(turns) < ROUND:
-        return turns
-    half = turns[np.argmin(turns[:, 0, 0])]
-    axis = np.append(np.linalg.solve(np.eye(2) - half[:2, :2], half[:2, 3]), 0.0)
+def _about(axis: FloatArray, count: int) -> FloatArray:
+    """(count, 4, 4) turns about the vertical through `axis` (3,)."""
     return upright_motions(axis, axis[None], count)
 
 
-def half_turn(points: FloatArray) -> FloatArray:
-    """(4, 4) the half turn about the vertical that best lays a thing (N, 3) onto itself.
-
-    Most things look alike from both ends, about an axis that need not go through the middle of what was seen:
-    a faucet's goes through its base, whichever way the spout points.
-    """
-    few, center = points[farthest_points(points, POINTS)], middle(points)
-    R = se3.euler(z=np.pi)
-    axes = [center + np.array([x, y, 0.0]) for x, y in _around(AXES, 5)]
-    motions = np.stack([se3.make(R, axis - R @ axis) for axis in axes])
-    best = motions[np.argsort(-onto(few, points, motions), kind="stable")[:REFINED]]
-    if len(points) >= 5:
-        refine = Refiner(points)
-        best = np.stack([*best, *(upright(refine(few, T), center) for T in best)])
-    chosen: FloatArray = best[np.argmax(onto(few, points, best))]
-    return chosen
-
-
-def _around(far: float, count: int) -> list[tuple[float, float]]:
-    """Offsets in a square grid of `count` rows, up to `far` to each side."""
-    side = np.linspace(-far, far, count).tolist()
-    return list(product(side, side))
-
-
-def onto(few: FloatArray, points: FloatArray, motions: FloatArray) -> FloatArray:
-    """(H,) share of `few` points that motions (H, 4, 4) carry nearer than `NEAR` to `points`."""
-    moved = se3.apply(motions, few)
-    distance = nearest(moved.reshape(-1, 3), points)[0].reshape(len(motions), -1)
-    share: FloatArray = (distance < NEAR).mean(axis=1)
-    return share
+def _deviations(values: FloatArray, mean: FloatArray, deviation: FloatArray) -> FloatArray:
+    return np.asarray((values - mean) / (deviation + ALIKE))

@@ -6,15 +6,16 @@ from dataclasses import replace
 import numpy as np
 
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud, farthest_points
+from imop.geometry.cloud import PointCloud, farthest_points, middle
 from imop.geometry.icp import SMALLEST, upright
 from imop.geometry.neighbours import within
+from imop.geometry.turns import axis_of_round, equal_turns, half_turn, upright_motions
 from imop.policy.contacts import SAME
 from imop.policy.evidence import Template
 from imop.policy.interfaces import BEGINNING, Candidate, Feasible, PolicyConfig, Progress, Scene, Transition
-from imop.policy.proposals import Asked, all_turns, equal_turns, half_turn, straightened, upright_motions
+from imop.policy.proposals import Asked, straightened
 from imop.policy.region import Goal, Region
-from imop.policy.target import BESIDE, Target, around, find_goal, middle, obstacles, thing_of
+from imop.policy.target import BESIDE, Target, around, find_goal, obstacles, thing_of
 from imop.policy.verification import Part, Pool, Sought, Verifier
 from imop.types import FloatArray
 
@@ -47,16 +48,13 @@ class StepSearch:
         others = standing.colors[~within(standing.points, region.whole.points, SAME)]
         template = Template(region, T_goal[:3, 3], beside, views, config, payload, goal, others)
         parts = _parts(region, payload, goal, T_goal[:3, 3], config)
-        turns = equal_turns(region.cloud)
-        self._half_turn = half_turn(thing_of(parts[0].coarse, standing.points))
-        # What is not round may be taken for itself half a turn round.
-        half = np.stack([np.eye(4), self._half_turn])
-        taken_for = all_turns(turns, config.among) if len(turns) > 1 else half
-        self.sought = Sought(config, step, region, template, parts, turns, taken_for, verifier)
+        turns = equal_turns(region.cloud.points)
+        half = half_turn(thing_of(parts[0].coarse, standing.points))
+        axis = axis_of_round(turns)
+        self.sought = Sought(config, step, region, template, parts, turns, axis, half, verifier)
         self._ask = ask
         # All of it, what stays in place on another thing, and what is next to the gripper.
         self._precise = [part for part in parts if part.name in ("region", "firm", "part")]
-        self._turns = all_turns(turns, config.painted)
         # What is around the goal is evidence, too.
         around_goal = np.zeros((0, 3)) if goal is None else goal.cloud.points
         self._concerned = np.concatenate([region.whole.points, around_goal, T_goal[None, :3, 3]])
@@ -70,7 +68,7 @@ class StepSearch:
             ranked = self._reachable_first(pool.ranked(), feasible)
             if ranked:
                 best, *others = ranked
-                ranked = pool.explained(best), *others
+                ranked = pool.explained(pool.settled(best)), *others
                 if best.reachable is not False and best.probability >= self.sought.config.enough:
                     break
         return ranked
@@ -162,14 +160,14 @@ class StepSearch:
         found: dict[str, list[FloatArray]] = {"half_turn": [], "straight": [], "upright": [], "exact": []}
         best = pool.best(self.sought.config.tried)
         # Which turn of a round thing is meant, its marks may say, or the arm, which cannot reach them all.
-        for T in best[:1] if len(self._turns) > 1 else ():
-            found["turn"] = [pool.finished(whole, motion) for motion in pool.as_painted(T @ self._turns)]
+        for T in best[:1]:
+            found["turn"] = [pool.turns.kept(M, pool.finished(whole, M)) for M in pool.turns.best(T)]
             found["turn"] += [pool.moved(whole, T @ S) for S in self.sought.turns[1:]]
         for T in best:
             found["exact"] += self._laid(pool, T)
             found["upright"].append(upright(T, center))
             straight = straightened(T, pool.T_repeated, center)
-            for name, other in (("half_turn", T @ self._half_turn), ("straight", straight)):
+            for name, other in (("half_turn", T @ self.sought.half), ("straight", straight)):
                 moved = pool.moved(whole, other)
                 found[name] += [moved, upright(moved, center)]
         for name, motions in found.items():

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from imop.geometry import se3
-from imop.geometry.cloud import PointCloud, facing, inside_box, project
+from imop.geometry.cloud import PointCloud, facing, inside_box, middle, project
 from imop.geometry.clusters import connected
 from imop.geometry.icp import Refiner
 from imop.geometry.neighbours import nearest, within
@@ -153,12 +153,6 @@ class Target:
         meant = np.unique(labels[self.query.focused(points, SAME)])
         large = np.intersect1d(np.flatnonzero(np.bincount(labels) >= fewest), meant)
         return np.array([middle(points[labels == label]) for label in large]).reshape(-1, 3)
-
-
-def middle(points: FloatArray) -> FloatArray:
-    """Centre of the bounding box: which side was seen shifts it less than the mean."""
-    center: FloatArray = (points.min(axis=0) + points.max(axis=0)) / 2
-    return center
 
 
 def thing_of(points: FloatArray, standing: FloatArray) -> FloatArray:

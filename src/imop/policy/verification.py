@@ -15,9 +15,9 @@ from imop.geometry import se3
 from imop.geometry.icp import CLOSE, FINEST
 from imop.geometry.ransac import distinct
 from imop.networks.verification import VerificationNetwork
-from imop.policy.evidence import Template, crowd, glance, looks, palette, shares
+from imop.policy.evidence import Template, crowd, glance, palette, shares
 from imop.policy.interfaces import Candidate, PolicyConfig, Transition
-from imop.policy.proposals import ROUND, Asked, Matches
+from imop.policy.proposals import Asked, Matches, Turns
 from imop.policy.region import Region
 from imop.policy.target import REACH, Target, obstacles
 from imop.types import BoolArray, FloatArray
@@ -26,10 +26,6 @@ from imop.types import BoolArray, FloatArray
 ELSEWHERE = (0.02, 0.26)
 # A point that is explained by more than this has a counterpart.
 FOUND = 0.3
-# Motions that take the region to about one place, about as upright, turn it: metres and cosine.
-PLACE = (0.02, 0.97)
-# Turns that differ by no more than this look the same.
-ALIKE = 0.01
 
 
 class Verifier:
@@ -84,7 +80,8 @@ class Sought:
         template: the same, ready to be compared.
         parts: of the region: all of it, what stays in place, then what else is looked for on its own.
         turns: (S, 4, 4) after which the region looks the same.
-        taken_for: (R, 4, 4) all turns that the region may be taken for another one in; one is none.
+        axis: (3,) a point of the axis of a round region, or None.
+        half: (4, 4) half a turn, in which the region may be taken for itself.
         verifier: gives probabilities.
     """
 
@@ -94,7 +91,8 @@ class Sought:
     template: Template
     parts: tuple[Part, ...]
     turns: FloatArray
-    taken_for: FloatArray
+    axis: FloatArray | None
+    half: FloatArray
     verifier: Verifier
 
     @property
@@ -102,10 +100,10 @@ class Sought:
         """(4, 4) the demonstrated action pose T_i."""
         return self.step.action.T_world_gripper
 
-    @cached_property
+    @property
     def center(self) -> FloatArray:
         """(3,) of the region."""
-        return np.asarray(self.region.cloud.points.mean(axis=0))
+        return self.template.center
 
     @cached_property
     def crowd(self) -> FloatArray:
@@ -138,12 +136,12 @@ class Pool:
     ) -> None:
         self._sought, self.target, self.T_last = sought, target, T_last
         self.T_repeated, self.asked = T_repeated, asked
+        self.turns = Turns(sought.template, target.surface, sought.axis, sought.half, sought.config)
         self._palette = palette(sought.template, target.surface)
         self._obstacles = obstacles
         self.motions: list[FloatArray] = []
         self.generators: list[str] = []
         self._rows: list[FloatArray] = []
-        self._places: list[tuple[FloatArray, FloatArray]] = []
         self._probabilities = np.zeros(0)
 
     def moved(self, part: Part, T: FloatArray) -> FloatArray:
@@ -153,6 +151,12 @@ class Pool:
     def finished(self, part: Part, T: FloatArray) -> FloatArray:
         """The same next to `T`, exactly."""
         return self.target.refine(part.fine, self.target.refine(part.coarse, T, CLOSE), FINEST)
+
+    def settled(self, candidate: Candidate) -> Candidate:
+        """The same in the best turn nearby, if closest points could not know it; what goes on is settled."""
+        if candidate.generator in ("hint", "gripper"):
+            return candidate
+        return replace(candidate, T_query_support=self.turns.nearby(candidate.T_query_support))
 
     def search(self, part: Part, seeds: FloatArray, name: str = "") -> None:
         """Refine and take in the most promising of seeds (H, 4, 4), in their colours and in any."""
@@ -166,19 +170,6 @@ class Pool:
             chosen |= {int(order[i]) for i in distinct(seeds[order], center, config.refined)}
         name = name or ("matches" if part.name == "region" else part.name)
         self.add(name, [self.moved(part, seeds[i]) for i in sorted(chosen)])
-
-    def as_painted(self, T: FloatArray) -> FloatArray:
-        """Those few of motions (H, 4, 4), each a small turn after the one before, that fit the paint best.
-
-        That is where colours, and their pattern whatever they are now, lie most as they were shown.
-        Neighbours of a better one are left out.
-        """
-        values = looks(self._sought.template, self.target.surface, T)
-        fits = ((values - values.mean(axis=0)) / (values.std(axis=0) + ALIKE))[:, 1:].sum(axis=1)
-        beside = np.stack([np.roll(fits, k) for k in (-2, -1, 1, 2)])
-        peaks = np.flatnonzero(fits >= beside.max(axis=0))
-        order = np.argsort(-fits[peaks], kind="stable")
-        return np.asarray(T[peaks[order][: self._sought.config.tried]])
 
     def add(self, name: str, motions: Sequence[FloatArray]) -> None:
         """Judge motions that differ from all before; the most promising ones, if there are too many."""
@@ -259,31 +250,7 @@ class Pool:
         others = self._support(T), self._poses(T), self._situation(len(T))
         # More in the hand's way than was shown.
         crowded = crowd(self._obstacles, T @ sought.T_goal) - sought.crowd
-        return np.concatenate([first, *others, crowded, self._turned(T)], axis=1)
-
-    def _turned(self, T: FloatArray) -> FloatArray:
-        """(H, 3) how far motions (H, 4, 4) stand out among all turns of them, in standard deviations.
-
-        Where a faint mark lies says little of where the region is, but much of its turn.
-        """
-        sought, surface = self._sought, self.target.surface
-        own = looks(sought.template, surface, T)
-        usual = np.stack([self._among_turns(motion) for motion in T])
-        return np.asarray((own - usual[:, 0]) / (usual[:, 1] + ALIKE))
-
-    def _among_turns(self, T: FloatArray) -> FloatArray:
-        """(2, 3) mean and standard deviation of `evidence.looks` over all turns after a motion (4, 4)."""
-        sought = self._sought
-        place = np.append(se3.apply(T, sought.center[None])[0], T[:3, 2])
-        round_one = len(sought.taken_for) >= ROUND
-        for known, usual in self._places if round_one else ():
-            if np.linalg.norm(place[:3] - known[:3]) < PLACE[0] and place[3:] @ known[3:] > PLACE[1]:
-                return usual
-        values = looks(sought.template, self.target.surface, T @ sought.taken_for)
-        usual = np.stack([values.mean(axis=0), values.std(axis=0)])
-        if round_one:
-            self._places.append((place, usual))
-        return usual
+        return np.concatenate([first, *others, crowded, self.turns.stand_out(T)], axis=1)
 
     def _support(self, T: FloatArray) -> FloatArray:
         """(H, 5) what the matches say, in any of the turns of equal shape."""
