@@ -127,19 +127,31 @@ def load_model(folder: Path = BUNDLED) -> Model:
     Raises:
         CorruptData: if a file is missing, damaged, of another version, or does not fit the configuration.
     """
-    remedy = f"name a folder with {CARD} and {WEIGHTS}"
-    card, content = _read_card(folder / CARD, remedy), read(folder / WEIGHTS, remedy)
-    if hashlib.sha256(content).hexdigest() != card.get("sha256"):
-        raise CorruptData(folder / WEIGHTS, "does not have the hash that the card names")
+    weights, config, _ = read_model(folder)
     try:
-        weights = load(content)
-        config = dacite.from_dict(ModelConfig, card["config"], dacite.Config(cast=[tuple], strict=True))
         _check_size(config, weights)
         model = Model(config)
         model.load_state_dict(weights)
     except Exception as error:  # nonsense in a configuration fails in many ways
         raise CorruptData(folder, f"weights and configuration do not fit ({error!r})") from error
     return model.eval()
+
+
+def read_model(folder: Path) -> tuple[dict[str, Tensor], ModelConfig, dict[str, Any]]:
+    """The weights by name, the shapes and the card that `save_model` wrote, whether or not they fit.
+
+    Raises:
+        CorruptData: if a file is missing, damaged, or of another version.
+    """
+    remedy = f"name a folder with {CARD} and {WEIGHTS}"
+    card, content = _read_card(folder / CARD, remedy), read(folder / WEIGHTS, remedy)
+    if hashlib.sha256(content).hexdigest() != card.get("sha256"):
+        raise CorruptData(folder / WEIGHTS, "does not have the hash that the card names")
+    try:
+        config = dacite.from_dict(ModelConfig, card["config"], dacite.Config(cast=[tuple], strict=True))
+        return load(content), config, card
+    except Exception as error:  # nonsense in a configuration fails in many ways
+        raise CorruptData(folder, f"cannot be read ({error!r})") from error
 
 
 def _read_card(path: Path, remedy: str) -> dict[str, Any]:

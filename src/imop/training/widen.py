@@ -6,19 +6,16 @@ What the verification network learned stays. The new evidence enters with the sm
 network; how it should enter, `imop.training.verification --further --only` learns.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import dacite
 import torch
 import tyro
-from safetensors.torch import load_file
 from torch import Tensor
 
 from imop.errors import InvalidInput
-from imop.networks.model import CARD, WEIGHTS, Model, ModelConfig, save_model
+from imop.networks.model import Model, read_model, save_model
 from imop.networks.verification import EVIDENCE, directions
 
 
@@ -82,11 +79,9 @@ def _among(columns: Sequence[int], old: Sequence[bool]) -> list[int]:
 def main() -> None:
     """Command line."""
     config = tyro.cli(Widening, description=__doc__)
-    card = json.loads((config.weights / CARD).read_text())
-    shape = dacite.from_dict(ModelConfig, card["config"], dacite.Config(cast=[tuple], strict=True))
+    former, shape, card = read_model(config.weights)
     torch.manual_seed(config.seed)
     model = Model(replace(shape, verification=replace(shape.verification, evidence=len(EVIDENCE))))
-    former = load_file(config.weights / WEIGHTS)
     model.load_state_dict(widen(former, model.state_dict(), config.new))
     save_model(model, config.out, card)
 
