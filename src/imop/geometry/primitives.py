@@ -12,6 +12,16 @@ from scipy.spatial import ConvexHull
 from imop.geometry.se3 import lengths
 from imop.types import FloatArray
 
+# Boxes around wrist, palm and fingers of a parallel gripper, after the Panda's: lower and upper corner,
+# gripper frame, metres.
+PARALLEL_GRIPPER = np.array(
+    [
+        [[-0.045, -0.045, -0.2], [0.045, 0.045, -0.105]],
+        [[-0.03, -0.1, -0.105], [0.03, 0.1, -0.05]],
+        [[-0.01, -0.05, -0.05], [0.01, 0.05, -0.01]],
+    ]
+)
+
 
 def sphere(p: FloatArray, size: FloatArray) -> FloatArray:
     """Distances (N,) of points `p` (N, 3) to a sphere of radius size[0]."""

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud, concatenate, farthest_points, inside_box
 from imop.geometry.neighbours import within
+from imop.geometry.primitives import PARALLEL_GRIPPER
 from imop.policy.contacts import SAME
 from imop.policy.interfaces import PolicyConfig
 from imop.policy.region import Goal, Region, fading
@@ -25,15 +26,6 @@ AROUND = 0.04
 # Colours that agree less than this contradict each other. What their pattern explains is told from noise of
 # this variance. Marks that vary less than this are taken to have kept their colours.
 CLASH, NOISE, FAINT = 0.1, 0.02, 0.01
-# Boxes around wrist, palm and fingers of a parallel gripper, after the Panda's: lower and upper corner,
-# gripper frame, metres.
-HAND = np.array(
-    [
-        [[-0.045, -0.045, -0.2], [0.045, 0.045, -0.105]],
-        [[-0.03, -0.1, -0.105], [0.03, 0.1, -0.05]],
-        [[-0.01, -0.05, -0.05], [0.01, 0.05, -0.01]],
-    ]
-)
 
 
 class Template:
@@ -289,8 +281,8 @@ def crowd(points: FloatArray, T_world_gripper: FloatArray) -> FloatArray:
         T_world_gripper: (H, 4, 4).
     """
     p_gripper = se3.apply(se3.invert(T_world_gripper), points).reshape(-1, 3)
-    inside = np.stack([inside_box(p_gripper, *box) for box in HAND], axis=1)
-    counts = inside.reshape(len(T_world_gripper), -1, len(HAND)).sum(axis=1)
+    inside = np.stack([inside_box(p_gripper, *box) for box in PARALLEL_GRIPPER], axis=1)
+    counts = inside.reshape(len(T_world_gripper), -1, len(PARALLEL_GRIPPER)).sum(axis=1)
     return np.asarray(np.log1p(counts))
 
 

@@ -40,7 +40,7 @@ PLACE = (0.02, 0.97)
 # Turns whose looks differ by no more than this look the same.
 ALIKE = 0.01
 # Fine turns to each side that belong to one peak, and how far off the turn of a motion usually is, radians.
-BESIDE, OFF = 4, 0.35
+BROAD, OFF = 4, 0.35
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +169,7 @@ class Turns:
         if self._axis is None:
             return T
         angles, fits = self._fits(T)
-        near = np.arange(-BESIDE, BESIDE + 1)
+        near = np.arange(-BROAD, BROAD + 1)
         likely = fits - 0.5 * (np.minimum(angles, 2 * np.pi - angles) / OFF) ** 2
         return self._turned(T, self._peak(angles, likely, near[likely[near].argmax()]))
 
@@ -189,7 +189,7 @@ class Turns:
 
     def _peak(self, angles: FloatArray, fits: FloatArray, k: int) -> float:
         """The angle at which `fits` (N,) at `angles` (N,) of a full turn are highest next to the k-th."""
-        near = np.arange(-BESIDE, BESIDE + 1)
+        near = np.arange(-BROAD, BROAD + 1)
         return float(angles[k] + peak(near * angles[1], fits[(k + near) % len(fits)]))
 
     def _turned(self, T: FloatArray, angle: float) -> FloatArray:
