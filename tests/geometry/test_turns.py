@@ -5,7 +5,7 @@ import pytest
 
 from imop.geometry import se3
 from imop.geometry.turns import axis_of_round, equal_turns, half_turn, onto, peak, upright_motions
-from tests.policy.scenes import RED, TABLE, at, box, colored
+from tests.policy.scenes import RED, TABLE, at, box, marked_can
 
 HERE = at(0.1, 0.1)
 CENTER = np.array([0.1, 0.1, TABLE])
@@ -20,15 +20,6 @@ def test_upright_motions_take_the_centre_to_every_place():
     np.testing.assert_allclose(motions[:, 2, 2], 1.0)
 
 
-def can(radius=0.04, height=0.08, spacing=0.004):
-    rng = np.random.default_rng(0)
-    count = int(2 * np.pi * radius * height / spacing**2)
-    angle = rng.uniform(0, 2 * np.pi, count)
-    out = np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=1)
-    points = radius * out + rng.uniform(0, height, count)[:, None] * [0, 0, 1] + CENTER
-    return colored(points, out, RED)
-
-
 def angles(cloud):
     turns = equal_turns(cloud.points)
     assert np.array_equal(turns[0], np.eye(4))
@@ -36,16 +27,18 @@ def angles(cloud):
 
 
 def test_a_can_looks_the_same_in_every_turn():
-    assert len(angles(can())) == 8
+    assert len(angles(marked_can(0.0, HERE))) == 8
 
 
 @pytest.mark.parametrize("seen", [slice(None), [0, 1, 7], [0, 3, 4, 5]])
 def test_every_turn_about_the_axis_of_a_can_leaves_it_where_it_is(seen):
     """Of what was seen from one side, some turns show the side that was not."""
-    cloud = can()
+    cloud = marked_can(0.0, HERE)
     axis = axis_of_round(equal_turns(cloud.points)[seen])
     turns = upright_motions(axis, axis[None], TURNS)
     assert onto(cloud.points[::5], cloud.points, turns).min() > 0.8
+    away = np.degrees(se3.rotation_distance(turns, np.eye(4))).round()
+    assert sorted(away) == sorted(min(15.0 * k, 360.0 - 15.0 * k) for k in range(TURNS))
 
 
 @pytest.mark.parametrize("size", [(0.06, 0.06, 0.06), (0.12, 0.03, 0.04)])

@@ -10,17 +10,7 @@ from imop.policy.proposals import Asked, Matches
 from imop.policy.region import Region
 from imop.policy.search import StepSearch
 from imop.policy.verification import Verifier
-from tests.policy.scenes import (
-    BLUE,
-    RED,
-    TABLE,
-    above,
-    at,
-    box,
-    marked_can,
-    scene,
-    transitions,
-)
+from tests.policy.scenes import BLUE, RED, TABLE, above, at, box, marked_can, scene, transitions
 
 HOME = above(0.0, -0.3, 1.2)
 GRASP = above(0.1, 0.1, TABLE + 0.05)

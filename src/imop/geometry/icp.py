@@ -77,6 +77,5 @@ def upright(T: FloatArray, center: FloatArray) -> FloatArray:
 
     Things that stand on a table in both scenes have not been tilted, however few points say so.
     """
-    yaw = np.arctan2(T[1, 0] - T[0, 1], T[0, 0] + T[1, 1])
-    R = se3.euler(z=float(yaw))
+    R = se3.euler(z=se3.yaw(T))
     return se3.make(R, T[:3, :3] @ center + T[:3, 3] - R @ center)

@@ -100,6 +100,11 @@ def euler(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> FloatArray:
     return np.asarray(Rotation.from_euler("xyz", (x, y, z)).as_matrix())
 
 
+def yaw(T: FloatArray) -> float:
+    """The turn about the vertical, radians, that is nearest to the rotation of a motion (4, 4)."""
+    return float(np.arctan2(T[1, 0] - T[0, 1], T[0, 0] + T[1, 1]))
+
+
 def orthonormal(T: FloatArray) -> FloatArray:
     """The pose (4, 4) with rounding errors of its rotation removed."""
     U, _, Vh = np.linalg.svd(T[:3, :3])

@@ -1,6 +1,5 @@
 """Turns about the vertical after which a thing looks the same, or nearly."""
 
-from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -26,6 +25,12 @@ def upright_motions(center: FloatArray, places: FloatArray, turns: int) -> Float
     yaw = np.linspace(0.0, 2 * np.pi, turns, endpoint=False)
     R = np.tile(np.stack([se3.euler(z=float(angle)) for angle in yaw]), (len(places), 1, 1))
     return se3.make(R, np.repeat(places, turns, axis=0) - R @ center)
+
+
+def turn_about(axis: FloatArray, angle: float) -> FloatArray:
+    """(4, 4) the turn by an angle, radians, about the vertical through `axis` (3,)."""
+    R = se3.euler(z=angle)
+    return se3.make(R, axis - R @ axis)
 
 
 def equal_turns(points: FloatArray) -> FloatArray:
@@ -65,9 +70,7 @@ def half_turn(points: FloatArray) -> FloatArray:
     a faucet's goes through its base, whichever way the spout points.
     """
     few, center = points[farthest_points(points, POINTS)], middle(points)
-    R = se3.euler(z=np.pi)
-    axes = [center + np.array([x, y, 0.0]) for x, y in _around(AXES, 5)]
-    motions = np.stack([se3.make(R, axis - R @ axis) for axis in axes])
+    motions = np.stack([turn_about(center + np.array([x, y, 0.0]), np.pi) for x, y in _around(AXES, 5)])
     best = motions[np.argsort(-onto(few, points, motions), kind="stable")[:REFINED]]
     if len(points) >= 5:
         refine = Refiner(points)
@@ -90,11 +93,11 @@ def onto(few: FloatArray, points: FloatArray, motions: FloatArray) -> FloatArray
     return share
 
 
-def peak(angles: Sequence[float] | FloatArray, fits: FloatArray) -> float:
+def peak(angles: FloatArray, fits: FloatArray) -> float:
     """The angle at which a parabola through `fits` (N,) at `angles` (N,) is highest.
 
     It is the best of the given ones if there is no such place between them.
     """
     a, b, _ = np.polyfit(angles, fits, 2)
     top = -b / (2 * a) if a < 0 else np.inf
-    return float(top if np.min(angles) <= top <= np.max(angles) else angles[int(np.argmax(fits))])
+    return float(top if angles.min() <= top <= angles.max() else angles[np.argmax(fits)])

@@ -27,7 +27,7 @@ from imop.policy.router import AdvancingRouter, LearnedRouter, Router
 from imop.types import Action, Demonstration, FloatArray, Match, Observation
 
 # The tip is kept this far above the ground, metres, if it was shown above it. What would be deeper in the
-# ground than the error of a pose is another motion, and left as it is.
+# ground than the error of a pose is another motion, and left as it is. Chosen on ring_on_peg, seeds 10 to 19.
 CLEARANCE, MISJUDGED = 0.003, 0.02
 
 

@@ -26,7 +26,7 @@ from imop.geometry import se3
 from imop.geometry.cloud import middle
 from imop.geometry.neighbours import nearest, within
 from imop.geometry.ransac import agreement, sample_motions
-from imop.geometry.turns import peak, upright_motions
+from imop.geometry.turns import peak, turn_about, upright_motions
 from imop.policy.contacts import SAME
 from imop.policy.evidence import Template, looks
 from imop.policy.interfaces import PolicyConfig
@@ -35,12 +35,12 @@ from imop.types import FloatArray
 
 # Share of the matches that must lead to a thing for the region to be set upright on it.
 SOME = 0.1
-# Motions that take the region to about one place, about as upright, turn it: metres and cosine.
-PLACE = (0.02, 0.97)
-# Turns whose looks differ by no more than this look the same.
-ALIKE = 0.01
-# Fine turns to each side that belong to one peak, and how far off the turn of a motion usually is, radians.
-BROAD, OFF = 4, 0.35
+# Motions that take the region to about one place, about as upright, turn it: metres and cosine. Turns whose
+# looks differ by no more than this look the same. Both were chosen on close_jar, seeds 10 to 19.
+PLACE, ALIKE = (0.02, 0.97), 0.01
+# The fine turns that belong to one peak, and how far off the turn of a motion usually is, radians. Both were
+# chosen on close_jar, seeds 10 to 29.
+NEAR, OFF = np.arange(-4, 5), 0.35
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,23 +162,21 @@ class Turns:
         beside = np.stack([np.roll(fits, k) for k in (-2, -1, 1, 2)])
         peaks = np.flatnonzero(fits >= beside.max(axis=0))
         best = peaks[np.argsort(-fits[peaks], kind="stable")][: self._config.tried]
-        return [self._turned(T, self._peak(angles, fits, k)) for k in best]
+        return [self._turned(T, _peak(angles, fits, k)) for k in best]
 
     def nearby(self, T: FloatArray) -> FloatArray:
         """The turn of a motion (4, 4) of something round that fits best among those nearby."""
         if self._axis is None:
             return T
         angles, fits = self._fits(T)
-        near = np.arange(-BROAD, BROAD + 1)
         likely = fits - 0.5 * (np.minimum(angles, 2 * np.pi - angles) / OFF) ** 2
-        return self._turned(T, self._peak(angles, likely, near[likely[near].argmax()]))
+        return self._turned(T, _peak(angles, likely, NEAR[likely[NEAR].argmax()]))
 
     def kept(self, T: FloatArray, T_laid: FloatArray) -> FloatArray:
         """The motion `T_laid` (4, 4) next to `T`, turned as `T` is."""
         if self._axis is None:
             return T_laid
-        R = se3.invert(T)[:3, :3] @ T_laid[:3, :3]
-        return self._turned(T_laid, -float(np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])))
+        return self._turned(T_laid, -se3.yaw(se3.invert(T) @ T_laid))
 
     def _fits(self, T: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(N,) angles, and how well something round fits after a motion (4, 4) and each of them."""
@@ -187,15 +185,9 @@ class Turns:
         angles = np.linspace(0.0, 2 * np.pi, len(values), endpoint=False)
         return angles, _deviations(values, values.mean(axis=0), values.std(axis=0)).sum(axis=1)
 
-    def _peak(self, angles: FloatArray, fits: FloatArray, k: int) -> float:
-        """The angle at which `fits` (N,) at `angles` (N,) of a full turn are highest next to the k-th."""
-        near = np.arange(-BROAD, BROAD + 1)
-        return float(angles[k] + peak(near * angles[1], fits[(k + near) % len(fits)]))
-
     def _turned(self, T: FloatArray, angle: float) -> FloatArray:
         assert self._axis is not None
-        R = se3.euler(z=angle)
-        return np.asarray(T @ se3.make(R, self._axis - R @ self._axis))
+        return np.asarray(T @ turn_about(self._axis, angle))
 
     def _looks(self, T: FloatArray) -> FloatArray:
         return looks(self._template, self._surface, T)
@@ -203,18 +195,24 @@ class Turns:
     def _usual(self, T: FloatArray) -> FloatArray:
         """(2, 3) mean and standard deviation of the looks of all turns of a motion (4, 4)."""
         place = np.append(se3.apply(T, self._template.center[None])[0], T[:3, 2])
-        for known, usual in self._places if self._axis is not None else ():
+        for known, usual in self._places:
             if np.linalg.norm(place[:3] - known[:3]) < PLACE[0] and place[3:] @ known[3:] > PLACE[1]:
                 return usual
         values = self._looks(T @ self._some)
         usual = np.stack([values.mean(axis=0), values.std(axis=0)])
-        self._places.append((place, usual))
+        if self._axis is not None:
+            self._places.append((place, usual))
         return usual
 
 
 def _about(axis: FloatArray, count: int) -> FloatArray:
     """(count, 4, 4) turns about the vertical through `axis` (3,)."""
     return upright_motions(axis, axis[None], count)
+
+
+def _peak(angles: FloatArray, fits: FloatArray, k: int) -> float:
+    """The angle at which `fits` (N,) at `angles` (N,) of a full turn are highest next to the k-th."""
+    return float(angles[k] + peak(NEAR * angles[1], fits[(k + NEAR) % len(fits)]))
 
 
 def _deviations(values: FloatArray, mean: FloatArray, deviation: FloatArray) -> FloatArray:

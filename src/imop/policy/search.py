@@ -64,14 +64,16 @@ class StepSearch:
     ) -> tuple[Candidate, ...]:
         """Where the region may be in the query, likeliest first; see `PreparedStep.locate`."""
         ranked: tuple[Candidate, ...] = ()
+        pool: Pool | None = None
         for pool in self.pools(query, progress):
             ranked = self._reachable_first(pool.ranked(), feasible)
-            if ranked:
-                best, *others = ranked
-                ranked = pool.explained(pool.settled(best)), *others
-                if best.reachable is not False and best.probability >= self.sought.config.enough:
-                    break
-        return ranked
+            enough = ranked and ranked[0].probability >= self.sought.config.enough
+            if enough and ranked[0].reachable is not False:
+                break
+        if pool is None or not ranked:
+            return ()
+        best, *others = ranked
+        return pool.explained(pool.settled(best)), *others
 
     def _reachable_first(
         self, ranked: tuple[Candidate, ...], feasible: Feasible | None
