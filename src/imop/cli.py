@@ -5,19 +5,19 @@ Exit codes: 0 done, 1 the task failed or the data have errors, 2 bad input or a 
 
 import os
 import sys
-from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Literal
 
 import tyro
 from rich.console import Console
-from rich.markup import escape
-from rich.status import Status
 from rich.text import Text
 from tyro.conf import Positional
 
+from imop import cli_data
 from imop.errors import ImopError, InvalidInput, MissingExtra
 from imop.files import writable_folder
+from imop.reproduce.command import reproduce
+from imop.terminal import console, list_folder, status
 from imop.training.ablation import Ablation
 from imop.training.config import TrainConfig
 from imop.training.recipe import RecipeName, make, refuse_others
@@ -25,25 +25,6 @@ from imop.training.recipe import RecipeName, make, refuse_others
 # Verbs import what they need when they run, so that --help does not wait for torch and MuJoCo.
 
 app = tyro.extras.SubcommandApp()
-# Names and messages may hold brackets and colons, which must be shown as they are.
-console = Console(markup=False, emoji=False, highlight=False)
-T = TypeVar("T")
-
-
-def _track(these: Sequence[T], doing: str) -> Iterable[T]:
-    """The same, with progress while they are worked on."""
-    from rich.progress import track
-
-    return track(these, escape(doing), console=console, transient=True)
-
-
-def _status(doing: str) -> Status:
-    return console.status(Text(doing))
-
-
-def _list(folder: Path) -> None:
-    for path in sorted(folder.iterdir()):
-        console.print(f"  {path}", soft_wrap=True)
 
 
 @app.command
@@ -97,9 +78,9 @@ def run(
         require_instances(task, "shown", f"{shown}", "nothing")
         if demo is not None:
             raise InvalidInput("shown", f"{shown} together with demo {demo}", "one of the two")
-    with _status(f"recording one demonstration of {task}" if demo is None else f"reading {demo}"):
+    with status(f"recording one demonstration of {task}" if demo is None else f"reading {demo}"):
         watched = demonstration_for(trial) if demo is None else load_demonstration(demo, demo_episode)
-    with _status(f"performing {task} in scene {seed}"):
+    with status(f"performing {task} in scene {seed}"):
         result = perform(trial, watched, method, out, min_confidence, video, weights)
     console.print(steps_table(result))
     scene = f"scene {seed}" + (f", instance {instance} after {shown}" if trial.other_things else "")
@@ -108,7 +89,7 @@ def run(
         f"{task}, {scene}: {'success' if result.success else f'failed: {result.reason}'}",
         style="green" if result.success else "red",
     )
-    _list(out)
+    list_folder(out)
     return 0 if result.success else 1
 
 
@@ -220,77 +201,10 @@ def evaluate(
     return 0
 
 
-@app.command(name="import")
-def import_(
-    layout: Positional[Literal["rlbench"]],
-    source: Positional[Path],
-    out: Positional[Path],
-    cameras: Annotated[str | None, tyro.conf.arg(metavar="NAME,NAME")] = None,
-) -> int:
-    """Convert recorded demonstrations into a store.
-
-    Nothing that can be read is left out; what `imop check` would say about it is said. Episodes that are in
-    the store already are not stored again, so an import that was stopped is continued by starting it again.
-
-    Args:
-        layout: how the recordings are laid out: rlbench as PerAct, RVT and Act3D use it.
-        source: an episode, a task folder, or a folder of task folders.
-        out: folder of the store; an existing one is appended to.
-        cameras: which cameras, joined by commas; by default front, left_shoulder, right_shoulder and wrist,
-            as far as they were recorded.
-    """
-    from imop.demos.rlbench_import import import_rlbench
-    from imop.robots.panda import tip_pose
-
-    names = None if cameras is None else cameras.split(",")
-    done = import_rlbench(source, out, names, tip_pose, lambda these: _track(these, f"importing {source}"))
-    for finding in done.findings:
-        console.print(str(finding))
-    console.print(
-        f"{done.stored} demonstrations imported into {out}, {done.there_already} were there already"
-    )
-    return 1 if any(finding.severity == "error" for finding in done.findings) else 0
-
-
-@app.command
-def export(layout: Positional[Literal["rlbench"]], store: Positional[Path], out: Positional[Path]) -> int:
-    """Write a store in the layout of other programs.
-
-    Args:
-        layout: how it is laid out: rlbench as PerAct, RVT and Act3D read it.
-        store: the store.
-        out: a new folder, which gets one folder per task.
-    """
-    from imop.demos.export import export_rlbench
-    from imop.demos.store import DemonstrationStore
-
-    stored = DemonstrationStore.open(store)
-    count = export_rlbench(stored, out, lambda numbers: _track(numbers, f"exporting {store}"))
-    console.print(f"{count} demonstrations exported into {out}")
-    return 0
-
-
-@app.command
-def check(
-    path: Positional[Path], cameras: Annotated[str | None, tyro.conf.arg(metavar="NAME,NAME")] = None
-) -> int:
-    """Say what is wrong with recorded demonstrations, where, and how to mend it.
-
-    Args:
-        path: a store, or a folder in RLBench's layout.
-        cameras: which cameras every episode of the folder should have, joined by commas; by default front,
-            left_shoulder, right_shoulder and wrist, as far as any episode has them.
-    """
-    from imop.demos.check import check as find
-    from imop.robots.panda import tip_pose
-
-    names = None if cameras is None else cameras.split(",")
-    findings = find(path, names, tip_pose, lambda these: _track(these, f"checking {path}"))
-    for finding in findings:
-        console.print(str(finding))
-    errors = sum(finding.severity == "error" for finding in findings)
-    console.print(f"{path}: {errors} errors, {len(findings) - errors} warnings")
-    return 1 if errors else 0
+app.command(reproduce)
+app.command(name="import")(cli_data.import_)
+app.command(cli_data.export)
+app.command(cli_data.check)
 
 
 @app.command
@@ -331,14 +245,14 @@ def predict(
     T_imop_world = frame_of(base)
     shown, recorded = load_demonstration(demo, demo_episode), load_demonstration(query, query_episode)
     shown, recorded = moved(shown, T_imop_world), moved(recorded, T_imop_world)
-    with _status(f"predicting {query}"):
+    with status(f"predicting {query}"):
         predictions = predict_recorded(shown, recorded, method, out, weights, T_imop_world, robot)
         try:
             draw_predictions(shown, recorded, predictions, out / "steps.png")
         except MissingExtra as error:
             console.print(f"no steps.png: {error}")
     console.print(predictions_table(predictions))
-    _list(out)
+    list_folder(out)
     return 0
 
 
@@ -377,7 +291,7 @@ def check_task(task: Positional[str]) -> int:
     """
     from imop.tasks.check_task import check_task as find
 
-    with _status(f"trying {task}"):
+    with status(f"trying {task}"):
         problems = find(task)
     for problem in problems:
         console.print(problem, soft_wrap=True)
@@ -385,33 +299,7 @@ def check_task(task: Positional[str]) -> int:
     return 1 if problems else 0
 
 
-@app.command
-def assets(suite: Positional[Literal["rlbench"]], source: Annotated[Path, tyro.conf.arg(name="from")]) -> int:
-    """Provide the model files that tasks need: they are copied into the user's cache, never into a package.
-
-    Args:
-        suite: whose files.
-        source: a checkout of RLBench, or any folder with its .ttm files.
-    """
-    from imop.tasks.rlbench import RLBENCH
-    from imop.tasks.rlbench.assets import folder, install
-
-    files = [name.removeprefix(f"{suite}/") for name in RLBENCH]
-    with _status(f"reading {source}"):
-        done = install(source, files)
-    unreadable = {file: found.error for file, found in done.items() if found.error}
-    for file, problem in unreadable.items():
-        console.print(f"{file}.ttm: {problem}", style="red")
-    missing = [file for file in files if file not in done]
-    if missing:
-        console.print(f"not found: {', '.join(missing)}")
-    for file, found in done.items():
-        if file not in files and not found.error:
-            remarks = "; ".join(found.lacks) or "nothing is lacking"
-            console.print(f"{file}.ttm, for a task of your own: {remarks}")
-    ready = sum(task.available() for task in RLBENCH.values())
-    console.print(f"{ready} of {len(files)} tasks of {suite} are available, from {folder()}")
-    return 1 if unreadable else 0
+app.command(cli_data.assets)
 
 
 @app.command

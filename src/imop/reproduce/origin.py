@@ -1,0 +1,57 @@
+"""Which code, machine and networks a table was made with."""
+
+import math
+import os
+import platform
+import shutil
+import subprocess
+from functools import cache
+from pathlib import Path
+
+from safetensors import safe_open
+
+import imop
+from imop.evaluation.fingerprint import code_digest
+from imop.networks.model import BUNDLED, WEIGHTS
+
+_UNTRAINED = ("replay", "textbook", "oracle", "expert")
+
+
+@cache
+def code() -> str:
+    """Digest of all of imop's source."""
+    return code_digest(imop)
+
+
+@cache
+def commit() -> str:
+    """The commit of imop's source, with "+" if a file differs; empty outside of a checkout."""
+    folder, git = Path(str(imop.__file__)).parent, shutil.which("git")
+    if git is None:
+        return ""
+    command = [git, "-C", str(folder), "describe", "--always", "--dirty=+", "--abbrev=7", "--exclude=*"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    return done.stdout.strip()
+
+
+def machine() -> str:
+    """Processor and cores, such as "x86_64, 2 cores"."""
+    return f"{platform.machine()}, {os.cpu_count()} cores"
+
+
+def parameters(method: str, weights: str) -> int | None:
+    """Numbers in all networks of a folder of weights.
+
+    Args:
+        method: that uses them.
+        weights: the folder; the bundled one if empty.
+
+    Returns:
+        None for a method without networks, or if the file is not there.
+    """
+    file = (Path(weights) if weights else BUNDLED) / WEIGHTS
+    if method in _UNTRAINED or not file.is_file():
+        return None
+    with safe_open(file, "pt") as tensors:
+        shapes: list[list[int]] = [tensors.get_slice(name).get_shape() for name in tensors.keys()]  # noqa: SIM118
+    return sum(math.prod(shape) for shape in shapes)

@@ -1,0 +1,158 @@
+"""What a table measures: rows of methods, on sections of tasks, and the published rows beside."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from imop.errors import InvalidInput
+from imop.evaluation.report import Instances
+from imop.evaluation.trials import Trial, suite_trials
+from imop.reproduce.published import Published
+from imop.sim.parts.grocery import GROCERIES
+from imop.tasks.suites import find_suite
+
+Column = Literal["kept", "parameters"]
+ARROW = " -> "
+"""Between what is shown and what is tried, in the name of a pair."""
+_CUPBOARD = "tabletop/grocery_in_cupboard"
+
+
+@dataclass(frozen=True)
+class Row:
+    """A method in one configuration.
+
+    Attributes:
+        label: what the table calls it; unique within its section.
+        method: name, see `make_policy`.
+        weights: folder of its networks; None for the bundled ones.
+        made_by: command that makes the weights.
+        against: label of the row that it is compared with; None for the first row of its section.
+        disturb: what goes wrong once in every episode; nothing if empty.
+        demonstrations: how many it is shown.
+        quick: whether it is tried by `--quick`, too.
+    """
+
+    label: str
+    method: str
+    weights: Path | None = None
+    made_by: str = ""
+    against: str | None = None
+    disturb: str = ""
+    demonstrations: int = 1
+    quick: bool = True
+
+    def tried_in(self, trials: Mapping[str, list[Trial]]) -> dict[str, list[Trial]]:
+        """The same scenes, as this row has them.
+
+        Raises:
+            InvalidInput: if episodes cannot be disturbed so, or not so many demonstrations be shown.
+        """
+        wanted: dict[str, tuple[Any, Any]] = {
+            "disturb": (self.disturb, ""),
+            "demonstrations": (self.demonstrations, 1),
+        }
+        changed = {name: value for name, (value, usual) in wanted.items() if value != usual}
+        known = {field.name for field in fields(Trial)}
+        for name, value in changed.items():
+            if name not in known:
+                raise InvalidInput(name, f"{value!r} is no option of `imop eval` yet", "nothing")
+        return {task: [replace(trial, **changed) for trial in these] for task, these in trials.items()}
+
+
+@dataclass(frozen=True)
+class Section:
+    """Tasks on which the rows are compared. This one has published numbers only.
+
+    Attributes:
+        title: of the section.
+        rows: what is tried; the first is what the others are compared with.
+        published: rows of the paper.
+    """
+
+    title: str
+    rows: tuple[Row, ...] = ()
+    published: tuple[Published, ...] = ()
+
+    def trials(self, episodes: int, seed: int) -> dict[str, list[Trial]]:
+        """Scenes of each task, without what single rows change in them."""
+        return {}
+
+    def absent(self) -> list[str]:
+        """Tasks of the section that cannot be tried because their files are not there."""
+        return []
+
+
+@dataclass(frozen=True)
+class SuiteSection(Section):
+    """Tasks of a suite.
+
+    Attributes:
+        suite: name of the suite.
+        split: which of its tasks.
+        instances: whether the scenes show the demonstrated objects or others of their kind.
+    """
+
+    suite: str = "rlbench"
+    split: str = "base"
+    instances: Instances = "same"
+
+    def trials(self, episodes: int, seed: int) -> dict[str, list[Trial]]:
+        """As `imop eval` would try them.
+
+        Raises:
+            InvalidInput: if there is no such suite or split.
+            AssetMissing: if no task can be tried.
+        """
+        return suite_trials(self.suite, self.split, (), episodes, seed, 0, other=self.instances == "other")
+
+    def absent(self) -> list[str]:
+        """Tasks of the split whose files are missing."""
+        kinds = find_suite(self.suite).get(self.split, {})
+        return [name.removeprefix(f"{self.suite}/") for name, kind in kinds.items() if not kind.available()]
+
+
+@dataclass(frozen=True)
+class GrocerySection(Section):
+    """One of nine groceries is put into the cupboard, after the same or another one was shown.
+
+    Attributes:
+        same: whether the shown grocery is the one to be put away.
+    """
+
+    same: bool = True
+
+    def trials(self, episodes: int, seed: int) -> dict[str, list[Trial]]:
+        """Scenes of every grocery, or of every pair of others, called "shown -> tried"."""
+        names = [kind.name for kind in GROCERIES]
+        pairs = [(a, b) for a in range(len(names)) for b in range(len(names)) if (a == b) == self.same]
+        return {
+            names[a] if self.same else names[a] + ARROW + names[b]: [
+                Trial(_CUPBOARD, seed + k, b, shown_variation=a) for k in range(episodes)
+            ]
+            for a, b in pairs
+        }
+
+
+@dataclass(frozen=True)
+class Table:
+    """One table, made by `imop reproduce NAME`.
+
+    Attributes:
+        name: of the command.
+        title: above the table.
+        sections: its parts; their rows and tasks may differ.
+        notes: what a reader must know to compare the numbers, one sentence each.
+        episodes: scenes of a task.
+        focus: whether somebody points at the thing that is acted on first.
+        columns: what is printed beside success and comparison: `kept`, how many of the scenes that the row
+            compared with solves are solved, too; `parameters` of the networks.
+    """
+
+    name: str
+    title: str
+    sections: tuple[Section, ...]
+    notes: tuple[str, ...] = ()
+    episodes: int = 25
+    focus: bool = False
+    columns: tuple[Column, ...] = ()
