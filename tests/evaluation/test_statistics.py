@@ -1,12 +1,15 @@
-"""Wilson's interval against its definition and against published values."""
+"""Intervals against their definition and published values; tests and ranks against counting by hand."""
+
+import math
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from imop.errors import InvalidInput
-from imop.evaluation.statistics import Z_95, wilson
+from imop.evaluation.statistics import average_ranks, mcnemar, wilson
 
+Z_95 = 1.959963984540054
 counts = st.integers(1, 500).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n)))
 
 
@@ -38,3 +41,25 @@ def test_known_values():
 def test_impossible_counts_are_refused(successes, trials):
     with pytest.raises(InvalidInput):
         wilson(successes, trials)
+
+
+@given(st.integers(0, 60), st.integers(0, 60))
+def test_mcnemar_counts_what_is_as_unlikely_under_a_fair_coin(a, b):
+    n = a + b
+    tail = sum(math.comb(n, k) for k in range(min(a, b) + 1)) / 2**n
+    assert mcnemar(a, b) == mcnemar(b, a) == pytest.approx(min(1.0, 2 * tail))
+
+
+def test_mcnemar_of_known_counts():
+    assert mcnemar(0, 0) == 1.0
+    assert mcnemar(0, 8) == pytest.approx(2 / 2**8)
+    assert mcnemar(25, 8) == pytest.approx(0.0045, abs=1e-4)
+    with pytest.raises(InvalidInput):
+        mcnemar(-1, 2)
+
+
+def test_equal_rates_share_the_better_rank():
+    # Ranks by task: 1 1 2, 1 2 1, 3 2 2.
+    assert average_ranks([[0.9, 0.5, 0.1], [0.9, 0.2, 0.3], [0.0, 0.2, 0.1]]) == pytest.approx(
+        [4 / 3, 4 / 3, 7 / 3]
+    )

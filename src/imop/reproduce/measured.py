@@ -136,6 +136,8 @@ def load_measured(path: Path) -> Measured:
     """
     try:
         fields = json.loads(read(path))
+        if not isinstance(fields, dict):
+            raise TypeError("not an object")
         return dacite.from_dict(Measured, fields, dacite.Config(cast=[tuple], strict=True))
     except (ValueError, TypeError, dacite.DaciteError) as error:
         remedy = "make it again with `imop reproduce`"

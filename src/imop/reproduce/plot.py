@@ -10,6 +10,7 @@ from imop.evaluation.statistics import wilson
 from imop.extras import extra
 from imop.files import replaced
 from imop.reproduce.measured import Measured, MeasuredSection
+from imop.reproduce.write import published_label
 
 _INCHES_OF_A_BAR = 0.11
 _SMALLEST, _LARGEST = 6.0, 40.0
@@ -43,19 +44,20 @@ def save_plot(measured: Measured, path: Path) -> bool:
     return True
 
 
-def _bars(section: MeasuredSection) -> list[tuple[str, bool, dict[str, tuple[float, float, float]]]]:
-    """Label, whether it is published, and task -> rate, lower and upper bound in percent."""
-    measured = [
-        (row.label, False, {task: _percent(count) for task, count in row.counts.items() if count.trials})
+Bars = tuple[str, bool, dict[str, tuple[float, float, float]]]
+"""Label, whether it is published, and task -> rate, lower and upper bound in percent."""
+
+
+def _bars(section: MeasuredSection) -> list[Bars]:
+    """Those of the rows that have rates of the section's tasks."""
+    bars: list[Bars] = [
+        (row.label, False, {task: _percent(count) for task, count in (row.counts or {}).items()})
         for row in section.rows
-        if row.counts
     ]
-    published = [
-        (f"{row.label}, published", True, {task: (rate, rate, rate) for task, rate in row.tasks.items()})
-        for row in section.published
-        if row.tasks
-    ]
-    return [*measured, *published]
+    for row in section.published:
+        rates = {task: rate for task, rate in row.tasks.items() if task in section.tasks}
+        bars.append((published_label(row), True, {task: (rate, rate, rate) for task, rate in rates.items()}))
+    return [one for one in bars if one[2]]
 
 
 def _percent(count: Count) -> tuple[float, float, float]:
@@ -63,7 +65,7 @@ def _percent(count: Count) -> tuple[float, float, float]:
     return 100 * count.rate, 100 * low, 100 * high
 
 
-def _draw(axis: Any, section: MeasuredSection, bars: list[Any]) -> None:
+def _draw(axis: Any, section: MeasuredSection, bars: list[Bars]) -> None:
     width = 1 / (len(bars) + 2)
     for k, (label, is_published, rates) in enumerate(bars):
         at = [i for i, task in enumerate(section.tasks) if task in rates]

@@ -154,7 +154,7 @@ def _cells_of_published(row: Published, section: MeasuredSection, head: Sequence
         "parameters": _NOTHING if row.parameters is None else f"{row.parameters:g} M",
     }
     average = _number(on_these(row, section.tasks))
-    return [_published_label(row), average, *(cells.get(name, _NOTHING) for name in head[2:])]
+    return [published_label(row), average, *(cells.get(name, _NOTHING) for name in head[2:])]
 
 
 def _published_ranks(section: MeasuredSection) -> dict[str, float]:
@@ -169,7 +169,7 @@ def by_task(section: MeasuredSection) -> list[Grid]:
     published = [row for row in section.published if row.tasks]
     if not measured and not published:
         return []
-    head = ["task", *(row.label for row in measured), *(_published_label(row) for row in published)]
+    head = ["task", *(row.label for row in measured), *(published_label(row) for row in published)]
     rows = []
     for task in section.tasks:
         counts = [row.counts.get(task) if row.counts else None for row in measured]
@@ -191,7 +191,8 @@ def _fraction(count: Count | None) -> str:
     return _NOTHING if count is None else f"{count.successes}/{count.trials}"
 
 
-def _published_label(row: Published) -> str:
+def published_label(row: Published) -> str:
+    """What a row of the paper is called beside ours."""
     return f"{row.label}, published"
 
 
