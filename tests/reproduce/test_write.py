@@ -37,7 +37,7 @@ def test_measured_and_published_numbers_stand_side_by_side():
     (section,) = table(*ROWS, tasks=("open_drawer", "stack_cubes")).sections
     head, learned, replay, absent, better, worse = summary(section)
     assert head[:2] == ["method", "mean of 2 tasks"]
-    assert learned[1].startswith("58.3 [") and absent[1] == "-"
+    assert learned[1].startswith("58.3 [") and absent[1] == "not measured"
     cells = dict(zip(head, replay, strict=True))
     assert cells["compared with"] == "learned" and cells["only that / only this"] == "2 / 0"
     cells = dict(zip(head, better, strict=True))
@@ -98,8 +98,8 @@ def test_a_document_gets_the_table(tmp_path):
 
 
 def test_reasons_are_said_once_for_all_rows_that_share_them():
-    rows = assemble((LEARNED, REPLAY), {}, {"learned": "not yet", "replay": "not yet"})
-    assert remarks(table(*rows))[0] == "Section, not measured: learned, replay (not yet)."
+    rows = assemble((LEARNED, REPLAY), {}, {"learned": "no reason", "replay": "no reason"})
+    assert remarks(table(*rows))[0] == "Section, not measured: learned; replay (no reason)."
 
 
 def test_bars_have_the_heights_and_whiskers_of_the_rates(tmp_path, monkeypatch):

@@ -17,6 +17,8 @@ from imop.reproduce.table import Column, Row
 
 Outcomes = Mapping[str, Sequence[bool | None]]
 """Whether each scene of each task was solved; None where there was no scene."""
+NOT_YET = "not yet"
+"""Why a row has no numbers in a table that nobody has measured."""
 
 
 @dataclass(frozen=True)

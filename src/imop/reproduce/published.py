@@ -113,6 +113,14 @@ NOVEL = (
 )
 # fmt: on
 
+LONG = (
+    Published(
+        "IMOP",
+        tasks={"block_pyramid": NOVEL[-1].tasks["block_pyramid"], "stack_cups": BASE[-1].tasks["stack_cups"]},
+    ),
+)
+"""The paper's own rates of tasks that are long in all of their variations."""
+
 PARAMETERS_BASE = (
     Published("RVT+FT", 4.7, parameters=104),
     Published("RVT+HDT", 62.9, parameters=131),

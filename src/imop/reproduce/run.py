@@ -13,7 +13,8 @@ from imop.evaluation.benchmark import tried
 from imop.evaluation.methods import make_policy
 from imop.evaluation.trials import Trial
 from imop.networks.model import WEIGHTS
-from imop.reproduce.measured import Measured, MeasuredRow, MeasuredSection, Outcomes, assemble
+from imop.reproduce.chains import against_parts
+from imop.reproduce.measured import NOT_YET, Measured, MeasuredRow, MeasuredSection, Outcomes, assemble
 from imop.reproduce.origin import code, commit, machine, parameters
 from imop.reproduce.table import Row, Section, Table
 
@@ -96,7 +97,9 @@ def measure(table: Table, options: Options, console: Console) -> Measured:
     if options.scenes(table) < 1:
         raise InvalidInput("episodes", f"{options.episodes}", "at least 1")
     sections = tuple(_measured(table, section, options, console) for section in table.sections)
-    return _described(table, options, sections)
+    parts = {chain: of_chain for section in table.sections for chain, of_chain in section.parts().items()}
+    measured = _described(table, options, sections)
+    return replace(measured, notes=(*against_parts(sections, parts), *measured.notes))
 
 
 def not_measured(table: Table, options: Options) -> Measured:
@@ -108,7 +111,7 @@ def not_measured(table: Table, options: Options) -> Measured:
             tasks = trials_of(table, section, options)
         except ImopError:
             tasks = {}
-        missing = dict.fromkeys([row.label for row in rows], "not yet")
+        missing = dict.fromkeys([row.label for row in rows], NOT_YET)
         sections.append(_section(section, tuple(tasks), assemble(rows, {}, missing)))
     return _described(table, options, tuple(sections))
 

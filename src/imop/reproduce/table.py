@@ -11,6 +11,7 @@ from imop.evaluation.trials import Trial, suite_trials
 from imop.reproduce.published import Published
 from imop.sim.parts.grocery import GROCERIES
 from imop.tasks.suites import find_suite
+from imop.tasks.task import Task
 
 Column = Literal["kept", "parameters"]
 ARROW = " -> "
@@ -82,6 +83,10 @@ class Section:
         """Tasks of the section that cannot be tried because their files are not there."""
         return []
 
+    def parts(self) -> dict[str, list[str]]:
+        """Tasks that are chains of others -> these, names without the suite."""
+        return {}
+
 
 @dataclass(frozen=True)
 class SuiteSection(Section):
@@ -108,8 +113,19 @@ class SuiteSection(Section):
 
     def absent(self) -> list[str]:
         """Tasks of the split whose files are missing."""
+        return [name for name, kind in self._kinds().items() if not kind.available()]
+
+    def parts(self) -> dict[str, list[str]]:
+        """Tasks with an attribute `parts`, the tasks that they are made of."""
+        chains = {name: getattr(kind, "parts", ()) for name, kind in self._kinds().items()}
+        return {name: [self._short(part.name) for part in of] for name, of in chains.items() if of}
+
+    def _kinds(self) -> dict[str, type[Task]]:
         kinds = find_suite(self.suite).get(self.split, {})
-        return [name.removeprefix(f"{self.suite}/") for name, kind in kinds.items() if not kind.available()]
+        return {self._short(name): kind for name, kind in kinds.items()}
+
+    def _short(self, name: str) -> str:
+        return name.removeprefix(f"{self.suite}/")
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,9 @@
 """A measured table as Markdown, on the terminal, and as a section of a document."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
+from textwrap import wrap
 
 from rich.table import Table as TerminalTable
 
@@ -9,6 +11,7 @@ from imop.errors import CorruptData, InvalidInput
 from imop.evaluation.report import Count, markdown_table
 from imop.files import read, replaced
 from imop.reproduce.measured import (
+    NOT_YET,
     Measured,
     MeasuredRow,
     MeasuredSection,
@@ -77,10 +80,10 @@ def remarks(measured: Measured) -> list[str]:
     for section in measured.sections:
         reasons: dict[str, list[str]] = {}
         for row in section.rows:
-            if row.missing:
+            if row.missing not in ("", NOT_YET):
                 reasons.setdefault(row.missing, []).append(row.label)
         for reason, labels in reasons.items():
-            lines.append(f"{section.title}, not measured: {', '.join(labels)} ({reason}).")
+            lines.append(f"{section.title}, not measured: {'; '.join(labels)} ({reason}).")
         if section.absent:
             lines.append(f"{section.title}, no model files here: {', '.join(section.absent)}.")
     return [*dict.fromkeys(lines), *measured.notes]
@@ -90,9 +93,16 @@ def _body(measured: Measured, heading: str) -> list[str]:
     lines = [f"    {measured.command}", "", origin(measured)]
     for section in measured.sections:
         lines += ["", f"{heading} {section.title}"]
+        if section.rows and all(row.missing == NOT_YET for row in section.rows):
+            lines += ["", *wrap(f"Not measured yet: {'; '.join(row.label for row in section.rows)}.", 110)]
+            section = replace(section, rows=())
         for head, *rows in grids(section, measured.columns):
             lines += ["", *markdown_table(head, rows)]
-    return [*lines, "", *(f"- {remark}" for remark in remarks(measured))]
+    return [*lines, "", *(line for remark in remarks(measured) for line in _item(remark))]
+
+
+def _item(sentence: str) -> list[str]:
+    return wrap(f"- {sentence}", 110, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
 
 
 def origin(measured: Measured) -> str:
@@ -109,8 +119,7 @@ def origin(measured: Measured) -> str:
 def grids(section: MeasuredSection, columns: Sequence[str] = ()) -> list[Grid]:
     """What is printed of a section: methods, then tasks."""
     methods = summary(section, columns)
-    plain = len(methods[0]) > 2 or any(row.missing or row.counts for row in section.rows)
-    return [*([methods] if plain else []), *by_task(section)]
+    return [*([methods] if methods[1:] else []), *by_task(section)]
 
 
 def summary(section: MeasuredSection, columns: Sequence[str] = ()) -> Grid:
@@ -142,7 +151,7 @@ def _cells_of_measured(row: MeasuredRow, head: Sequence[str]) -> list[str]:
         "kept of what the other solves": str(pairs.kept) if pairs else _NOTHING,
         "parameters": _NOTHING if row.parameters is None else f"{row.parameters / 1e6:.2f} M",
     }
-    average = _NOTHING if row.missing else _average(row)
+    average = _average(row) if row.counts else "not measured"
     return [row.label, average, *(cells.get(name, _NOTHING) for name in head[2:])]
 
 
