@@ -6,7 +6,6 @@ Each row becomes a folder of weights with which `imop eval --methods paper --wei
 see the same pairs in the same order, for as many steps. Run again, it goes on where it was stopped.
 """
 
-import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -15,7 +14,7 @@ import tyro
 from rich.console import Console
 
 from imop.networks.model import BUNDLED
-from imop.training.commands import Stage, run
+from imop.training.commands import Stage, quoted, run
 
 Row = Literal[
     "small",
@@ -89,14 +88,14 @@ def _routing(config: AblationsConfig, name: str, options: str) -> Stage:
 def _row(config: AblationsConfig, name: Row) -> list[Stage]:
     shares = f" --shares {' '.join(map(str, config.shares))}" if config.shares else ""
     blind = "_no_low_dimensional" if name == "no_low_dimensional" else ""
-    networks, out = f"{_quoted(config.out)}/networks", _quoted(config.out)
+    networks, out = f"{quoted(config.out)}/networks", quoted(config.out)
     trained = (
         f"{_train(config, name)} --train {_paths(config.train)}{shares} --validate {_paths(config.validate)}"
         f" --batch 16 --steps {config.steps} --learning-rate 0.0013 {ROWS[name]}"
     )
     merged = (
         f"-m imop.training.merge --out {out}/{name} --pairs {networks}/{name}"
-        f" --routing {networks}/routing{blind} --verification {_quoted(BUNDLED)}"
+        f" --routing {networks}/routing{blind} --verification {quoted(BUNDLED)}"
     )
     return [
         Stage(f"{name}_networks", f"networks/{name}/card.json", trained),
@@ -105,15 +104,11 @@ def _row(config: AblationsConfig, name: Row) -> list[Stage]:
 
 
 def _train(config: AblationsConfig, name: str) -> str:
-    return f"-m imop.cli train --out {_quoted(config.out)}/networks/{name} --seed {config.seed}"
+    return f"-m imop.cli train --out {quoted(config.out)}/networks/{name} --seed {config.seed}"
 
 
 def _paths(folders: tuple[Path, ...]) -> str:
-    return " ".join(map(_quoted, folders))
-
-
-def _quoted(path: Path) -> str:
-    return shlex.quote(str(path))
+    return " ".join(map(quoted, folders))
 
 
 def main() -> None:
