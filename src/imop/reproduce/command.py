@@ -22,6 +22,7 @@ def reproduce(
     episodes: int | None = None,
     seed: int = 7000,
     jobs: int = 2,
+    methods: Annotated[str, tyro.conf.arg(metavar="NAME,NAME")] = "",
     out: Path = Path("runs/reproduce"),
     write_docs: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None,
 ) -> int:
@@ -38,6 +39,7 @@ def reproduce(
         episodes: scenes per task; 25 if not given, 10 for a pair of cross-object.
         seed: first seed of the scenes.
         jobs: parallel processes.
+        methods: try only the rows of these; the others are printed as far as they were tried before.
         out: folder of all tables.
         write_docs: document whose section of the table is replaced, such as docs/results.md. Without a table
             all sections are, by what was measured before; nothing is measured then.
@@ -45,7 +47,7 @@ def reproduce(
     from imop.reproduce.run import Options
     from imop.reproduce.tables import find_table
 
-    options = Options(out, quick, episodes, seed, jobs)
+    options = Options(out, quick, episodes, seed, jobs, tuple(methods.split(",")) if methods else ())
     if quick and write_docs is not None:
         raise InvalidInput("write-docs", "together with quick", "the whole table")
     if table is not None:

@@ -5,9 +5,9 @@ from dataclasses import replace
 from rich.table import Table as TerminalTable
 
 from imop.errors import ImopError
+from imop.reproduce import tables
 from imop.reproduce.run import Options, rows_of, trials_of, why_not
 from imop.reproduce.table import Table
-from imop.reproduce.tables import TABLES
 
 SECONDS = 8.0
 """Of one core for an episode with its share of the demonstrations: the mean over base tasks."""
@@ -29,7 +29,7 @@ def costs_table(options: Options) -> TerminalTable:
     """Every table with its rows and its cost, as a whole and quick."""
     head = ("table", "", "rows", "episodes", "core hours", "quick: episodes", "minutes")
     found = TerminalTable(*head, caption="Tables share episodes, and what was tried is not tried again.")
-    for table in TABLES.values():
+    for table in tables.TABLES.values():
         rows = {row for section in table.sections for row in section.rows}
         there = sum(not why_not(row) for row in rows)
         whole, quick = (episodes_of(table, replace(options, quick=quick)) for quick in (False, True))

@@ -10,6 +10,7 @@ from rich.console import Console
 
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.benchmark import tried
+from imop.evaluation.episodes import Episode, EpisodeLog, method_state
 from imop.evaluation.methods import make_policy
 from imop.evaluation.trials import Trial
 from imop.networks.model import WEIGHTS
@@ -34,6 +35,7 @@ class Options:
         episodes: scenes of a task; None for the table's number.
         seed: of the first scene.
         jobs: processes.
+        methods: only rows of these are tried, all if empty; the others are printed as far as they are logged.
     """
 
     out: Path = Path("runs/reproduce")
@@ -41,6 +43,7 @@ class Options:
     episodes: int | None = None
     seed: int = 7000
     jobs: int = 2
+    methods: tuple[str, ...] = ()
 
     def command(self, table: Table) -> str:
         """What one types to measure the table so."""
@@ -50,6 +53,10 @@ class Options:
             if getattr(self, name) != getattr(usual, name):
                 words += [f"--{name}", str(getattr(self, name))]
         return shlex.join(words)
+
+    def tries(self, row: Row) -> bool:
+        """Whether the row is tried."""
+        return not self.methods or row.method in self.methods
 
     def scenes(self, table: Table) -> int:
         """Scenes of a task."""
@@ -125,13 +132,19 @@ def _measured(table: Table, section: Section, options: Options, console: Console
     outcomes: dict[str, Outcomes] = {}
     missing = {row.label: reason for row in rows if (reason := why_not(row))}
     there = [row for row in rows if row.label not in missing]
-    for together in _together(there):
+    for together in _together([row for row in there if options.tries(row)]):
         names = ", ".join(row.label for row in together)
         console.print(f"{section.title}: {names}")
         try:
             outcomes |= _tried(together, trials, table.focus, options, console)
         except ImopError as error:
             missing |= {row.label: str(error) for row in together}
+    if left_out := [row for row in there if not options.tries(row)]:
+        log = EpisodeLog(options.out / LOG)
+        outcomes |= {
+            row.label: found for row in left_out if (found := _logged(row, trials, table.focus, log))
+        }
+        missing |= {row.label: "left out by --methods" for row in left_out if row.label not in outcomes}
     return _section(section, tuple(trials), assemble(rows, outcomes, missing))
 
 
@@ -158,10 +171,29 @@ def _tried(
     found = tried(everything, methods, options.jobs, console, log, rows[0].weights, focus)
     return {
         row.label: {
-            task: [found[trial, row.method].success for trial in of_task] for task, of_task in scenes.items()
+            task: [_outcome(found[trial, row.method]) for trial in of_task]
+            for task, of_task in scenes.items()
         }
         for row in rows
     }
+
+
+def _logged(row: Row, trials: Mapping[str, list[Trial]], focus: bool, log: EpisodeLog) -> Outcomes | None:
+    """What happened in every scene, if all of them are in the log."""
+    outcomes = {}
+    for task, of_task in row.tried_in(trials).items():
+        state = method_state(row.method, row.weights, of_task[0].task) + ("-focus" if focus else "")
+        found = [log.find(trial, row.method, state) for trial in of_task]
+        outcomes[task] = [_outcome(episode) for episode in found if episode is not None]
+        if len(outcomes[task]) < len(of_task):
+            return None
+    return outcomes
+
+
+def _outcome(episode: Episode) -> bool | None:
+    """Whether it succeeded; None if there was no scene, or what should have disturbed it did not happen."""
+    happened = not getattr(episode.trial, "disturb", "") or getattr(episode, "disturbed", True)
+    return episode.success if happened else None
 
 
 @cache
@@ -170,7 +202,6 @@ def why_not(row: Row) -> str:
     if row.weights is not None and not (row.weights / WEIGHTS).is_file():
         return f"no weights in {row.weights}; {row.made_by}"
     try:
-        row.tried_in({})
         make_policy(row.method, weights=row.weights)
     except InvalidInput as error:
         return f"{error.field}: {error.problem} is not there"

@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
+import imop.evaluation.trials
 from imop.errors import InvalidInput
 from imop.evaluation.report import Instances
 from imop.evaluation.trials import Trial, suite_trials
@@ -43,22 +44,24 @@ class Row:
     demonstrations: int = 1
     quick: bool = True
 
-    def tried_in(self, trials: Mapping[str, list[Trial]]) -> dict[str, list[Trial]]:
-        """The same scenes, as this row has them.
+    def tried_in(self, scenes: Mapping[str, list[Trial]]) -> dict[str, list[Trial]]:
+        """The same scenes, as this row has them; tasks in which its disturbance cannot happen are left out.
 
         Raises:
             InvalidInput: if episodes cannot be disturbed so, or not so many demonstrations be shown.
         """
-        wanted: dict[str, tuple[Any, Any]] = {
-            "disturb": (self.disturb, ""),
-            "demonstrations": (self.demonstrations, 1),
-        }
-        changed = {name: value for name, (value, usual) in wanted.items() if value != usual}
-        known = {field.name for field in fields(Trial)}
-        for name, value in changed.items():
-            if name not in known:
-                raise InvalidInput(name, f"{value!r} is no option of `imop eval` yet", "nothing")
-        return {task: [replace(trial, **changed) for trial in these] for task, these in trials.items()}
+        found = dict(scenes)
+        if self.disturb:
+            disturbed = getattr(imop.evaluation.trials, "disturbed", None)
+            if disturbed is None:
+                raise InvalidInput("disturb", f"{self.disturb} is not there yet", "nothing")
+            found = disturbed(found, self.disturb)
+        if self.demonstrations != 1:
+            if "demonstrations" not in {field.name for field in fields(Trial)}:
+                raise InvalidInput("demonstrations", f"{self.demonstrations} are not there yet", "1")
+            shown: dict[str, Any] = {"demonstrations": self.demonstrations}
+            found = {task: [replace(trial, **shown) for trial in these] for task, these in found.items()}
+        return found
 
 
 @dataclass(frozen=True)
