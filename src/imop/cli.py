@@ -167,6 +167,8 @@ def evaluate(
     instance: int = 0,
     instances: Literal["same", "other"] = "same",
     change: Annotated[str, tyro.conf.arg(metavar="FACTOR,FACTOR")] = "",
+    disturb: Literal["", "moved", "knocked", "missed", "shut"] = "",
+    second_try: bool = False,
     jobs: int = 2,
     weights: Path | None = None,
     out: Path = Path("runs/eval"),
@@ -191,6 +193,10 @@ def evaluate(
         change: what the scenes differ in from the demonstrated ones, joined by commas: object_color,
             object_size, light, table_color, distractors, camera_pose, or all of these as all; errors of the
             sensors d415, calibration, knocked, fewer_cameras. docs/tasks.md says what they are.
+        disturb: what goes wrong once in every episode: what is about to be acted on is moved by 10 cm, what
+            was taken is knocked out of the hand, missed by it, or what was opened is pushed shut.
+        second_try: go on after a motion that cannot be planned, up to the task's limit of actions; always
+            so if disturbed.
         jobs: parallel processes.
         weights: folder that `imop train` wrote, for the learned policy; by default the bundled weights.
         out: folder for the results.
@@ -213,6 +219,8 @@ def evaluate(
         weights,
         change,
         instances,
+        disturb,
+        second_try,
     )
     results.save(out)
     console.print(results.table())

@@ -1,6 +1,7 @@
 """Success rates of several methods on the same demonstrations and scenes."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -14,8 +15,16 @@ from imop.evaluation.methods import make_policy
 from imop.evaluation.pointing import pointing
 from imop.evaluation.report import Count, Instances, Results
 from imop.evaluation.rollout import rollout
-from imop.evaluation.trials import Trial, change_notes, demonstration_for, most_actions, suite_trials
+from imop.evaluation.trials import (
+    Trial,
+    change_notes,
+    demonstration_for,
+    disturbed,
+    most_actions,
+    suite_trials,
+)
 from imop.policy.one_shot import OneShotPolicy
+from imop.tasks.disturbances import DISTURBANCES
 from imop.tasks.expert import ExpertFailed, perform
 from imop.tasks.layout import NoRoom
 from imop.types import Demonstration
@@ -26,8 +35,10 @@ NOTES = (
     "replay, registration and learned see four 128 x 128 RGB-D views, camera poses, joint positions and "
     "the gripper; no segmentation, names or object poses.",
     "oracle carries the demonstrated poses over by the true object pose; expert reads everything.",
-    "A motion that cannot be planned ends the episode as failed.",
 )
+
+ENDS = "A motion that cannot be planned ends the episode as failed."
+SECOND_TRY = "An episode goes on after a motion that cannot be planned, up to the task's limit of actions."
 
 
 SAME = (
@@ -51,6 +62,8 @@ def evaluate_suite(
     weights: Path | None = None,
     change: str = "",
     instances: Instances = "same",
+    disturb: str = "",
+    second_try: bool = False,
 ) -> Results:
     """Try every method in the same `episodes` scenes of every task.
 
@@ -68,13 +81,19 @@ def evaluate_suite(
         weights: of the learned policy; None for the bundled ones.
         change: what the scenes differ in, names of `tasks.changes.FACTORS` joined by commas.
         instances: whether the scenes show the demonstrated objects or others of their kind.
+        disturb: what goes wrong once in every episode, one of `tasks.disturbances.DISTURBANCES`, if any.
+        second_try: whether an episode goes on after a motion that cannot be planned, as a disturbed one does.
 
     Raises:
-        InvalidInput: for an unknown suite, split, task, method or change, or other instances where there are
-            none.
+        InvalidInput: for an unknown suite, split, task, method, change or disturbance, or other instances
+            where there are none.
         CorruptData: if the log cannot be read.
     """
     trials = suite_trials(suite, split, tasks, episodes, seed, instance, change, instances == "other")
+    if second_try:
+        trials = {task: [replace(t, second_try=True) for t in of_task] for task, of_task in trials.items()}
+    without = set(trials)
+    trials = disturbed(trials, disturb) if disturb else trials
     everything = [trial for of_task in trials.values() for trial in of_task]
     found = tried(everything, methods, jobs, console, log, weights)
     counts = {
@@ -82,8 +101,22 @@ def evaluate_suite(
         for method in methods
     }
     names = ",".join(tasks) or split
-    notes = (*NOTES, OTHER if instances == "other" else SAME, *change_notes(trials, change))
-    return Results(suite, names, seed, counts, notes, change, instances)
+    notes = [*NOTES, SECOND_TRY if second_try or disturb else ENDS, OTHER if instances == "other" else SAME]
+    notes += change_notes(trials, change)
+    if disturb:
+        notes += disturbance_notes(disturb, found, sorted(without - set(trials)))
+    return Results(suite, names, seed, counts, tuple(notes), change, instances, disturb)
+
+
+def disturbance_notes(
+    disturb: str, episodes: Mapping[tuple[Trial, str], Episode], without: Sequence[str]
+) -> list[str]:
+    """What a disturbance means, how often it happened, and in which tasks it cannot."""
+    notes = [f"{disturb}: {DISTURBANCES[disturb]}"]
+    for method in dict.fromkeys(method for _, method in episodes):
+        own = [e for (_, m), e in episodes.items() if m == method and e.success is not None]
+        notes.append(f"With {method} it happened in {sum(e.disturbed for e in own)} of {len(own)} episodes.")
+    return notes + [f"It cannot happen in {', '.join(without)}."] * bool(without)
 
 
 def tried(
@@ -149,14 +182,18 @@ def attempt(
             policy.watch(demonstration.stripped(), meant)
         else:
             policy.watch(demonstration if method == "oracle" else demonstration.stripped())
-        result = rollout(env, policy, most_actions(method, demonstration, env.task), point=point)
+        result = rollout(env, policy, most_actions(method, demonstration, trial, env.task), point=point)
     except (MissingExtra, AssetMissing):
         raise  # says nothing about the method
+    except NoRoom as error:
+        return Episode(trial, method, state, None, str(error))
     except ImopError as error:
         # What a policy cannot handle it has failed at; the other methods and scenes go on.
         return Episode(trial, method, state, False, str(error), error=not isinstance(error, ExpertFailed))
     decisions = tuple((step.generator, step.confidence) for step in result.steps)
-    return Episode(trial, method, state, result.success, result.reason, len(result.steps), decisions)
+    happened = any(step.disturbed for step in result.steps)
+    ended = result.success, result.reason, len(result.steps), decisions
+    return Episode(trial, method, state, *ended, disturbed=happened)
 
 
 def count_of(episodes: Iterable[Episode]) -> Count:

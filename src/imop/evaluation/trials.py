@@ -8,6 +8,7 @@ from imop.errors import ImopError, InvalidInput
 from imop.evaluation.splits import chosen_tasks
 from imop.sim.sensing import Sensing
 from imop.tasks.changes import FACTORS, Change, changes_of, read_factors
+from imop.tasks.disturbances import can_happen, require_disturbance
 from imop.tasks.env import ImopEnv, make_task
 from imop.tasks.expert import ExpertFailed, record_demonstration
 from imop.tasks.layout import NoRoom
@@ -32,9 +33,11 @@ class Trial:
         change: names of `tasks.changes.FACTORS`, joined by commas; what the scene differs in.
         shown: that of the demonstration; None if it is the same.
         shown_variation: of the task in the demonstration; None if it is the same.
+        disturb: what goes wrong once, see `tasks.disturbances.DISTURBANCES`; nothing if empty.
+        second_try: whether the episode goes on after a motion that cannot be planned. It does if disturbed.
 
     Raises:
-        InvalidInput: for a negative seed, or an unknown change.
+        InvalidInput: for a negative seed, or an unknown change or disturbance.
     """
 
     task: str
@@ -44,12 +47,17 @@ class Trial:
     change: str = ""
     shown: int | None = None
     shown_variation: int | None = None
+    disturb: str = ""
+    second_try: bool = False
 
     def __post_init__(self) -> None:
         for name in ("seed", "instance", "shown"):
             if (getattr(self, name) or 0) < 0:
                 raise InvalidInput(name, f"{getattr(self, name)}", "a whole number from 0 on")
         object.__setattr__(self, "change", ",".join(read_factors(self.change)))
+        if self.disturb:
+            require_disturbance(self.disturb)
+            object.__setattr__(self, "second_try", True)
 
     @cached_property
     def changed(self) -> Change:
@@ -82,7 +90,13 @@ class Trial:
         """
         if not 0 <= self.seed < DEMONSTRATION_SEED:
             raise InvalidInput("seed", f"{self.seed}", f"0 .. {DEMONSTRATION_SEED - 1}")
-        env = ImopEnv(self.make_task(), change=self.changed, sense=self.changed.tested)
+        env = ImopEnv(
+            self.make_task(),
+            change=self.changed,
+            sense=self.changed.tested,
+            disturb=self.disturb,
+            second_try=self.second_try,
+        )
         env.reset(seed=self.seed, options={"variation": self.variation, "instance_seed": self.instance})
         return env
 
@@ -158,6 +172,31 @@ def suite_trials(
     }
 
 
+def disturbed(trials: Mapping[str, Sequence[Trial]], disturb: str) -> dict[str, list[Trial]]:
+    """The same scenes, disturbed; tasks in which that cannot happen are left out.
+
+    Raises:
+        InvalidInput: for an unknown disturbance, or one that can happen in none of the tasks.
+    """
+    found = {
+        task: [replace(trial, disturb=disturb) for trial in of_task]
+        for task, of_task in trials.items()
+        if _can_happen(disturb, of_task[0])
+    }
+    if not found:
+        raise InvalidInput("disturb", f"{disturb} of {', '.join(trials)}", "a task in which that can happen")
+    return found
+
+
+def _can_happen(disturb: str, trial: Trial) -> bool:
+    require_disturbance(disturb)
+    try:
+        env = trial.env()
+    except NoRoom:
+        return True  # another scene of the task will tell
+    return can_happen(disturb, env.task, env.world)
+
+
 def require_instances(task: str, field: str, value: str, accepted: str) -> None:
     """Refuse a value that asks for another instance of the things of a task.
 
@@ -181,6 +220,6 @@ def change_notes(trials: Mapping[str, Sequence[Trial]], change: str) -> list[str
     return [*(f"{factor}: {FACTORS[factor]}" for factor in wanted), *without]
 
 
-def most_actions(method: str, demonstration: Demonstration, task: Task) -> int:
-    """As many as were demonstrated, or as the task allows to a method that can go back to a step."""
-    return task.step_limit if method == "routed" else len(demonstration)
+def most_actions(method: str, demonstration: Demonstration, trial: Trial, task: Task) -> int:
+    """As many as were demonstrated, or as the task allows to those who may try again."""
+    return task.step_limit if method == "routed" or trial.second_try else len(demonstration)

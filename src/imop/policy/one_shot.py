@@ -23,6 +23,7 @@ from imop.policy.interfaces import (
     Transition,
 )
 from imop.policy.learned import LearnedMatcher
+from imop.policy.recovery import Attempts
 from imop.policy.router import AdvancingRouter, LearnedRouter, Router
 from imop.types import Action, Demonstration, FloatArray, Match, Observation
 
@@ -66,8 +67,9 @@ class OneShotPolicy:
         self._prepared: list[list[PreparedStep]] = []
         self._cameras: set[str] = set()
         self._camera_errors: dict[str, FloatArray] = {}
-        self._progress = BEGINNING
+        self._progress = self._before = BEGINNING
         self._last: Scene | None = None
+        self._attempts = Attempts()
 
     @classmethod
     def from_pretrained(
@@ -130,11 +132,14 @@ class OneShotPolicy:
 
     def reset(self) -> None:
         """Begin a new episode."""
-        self._progress, self._last = BEGINNING, None
+        self._progress = self._before = BEGINNING
+        self._last, self._attempts = None, Attempts()
         self.router.reset()
 
     def act(self, observation: Observation, focus: Focus | None = None) -> Action:
         """The action for what is seen now, with its confidence and the matched points.
+
+        If the arm is not where the last action sent it, that step is tried again, elsewhere.
 
         Args:
             observation: what is seen.
@@ -153,11 +158,17 @@ class OneShotPolicy:
                 "views", f"camera {missing[0]} is missing", f"all of {', '.join(sorted(self._cameras))}"
             )
         query = self.see(observation, focus, self._last)
+        if not self._attempts.arrived(observation):
+            self.router.undo()
+            self._progress = self._before
         number, step = self.router.route(query)
-        action = self.locate(query, step, number, self._progress)
+        tried = self._attempts.go_on((number, step))
+        action = self.locate(query, step, number, replace(self._progress, tried=tried))
         self.router.took(number, step)
+        self._attempts.took((number, step), action.T_world_gripper)
         assert action.match is not None
-        self._progress, self._last = Progress(action.match.T_query_support), query
+        self._before, self._progress = self._progress, Progress(action.match.T_query_support)
+        self._last = query
         return action
 
     def see(

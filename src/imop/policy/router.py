@@ -26,7 +26,10 @@ from imop.networks.changes import change_graph, compared
 from imop.networks.model import Model
 from imop.networks.routing import Described, States, make_states
 from imop.policy.interfaces import Scene, Transition
-from imop.types import FloatArray
+from imop.types import FloatArray, Observation
+
+# Fingers that are open by less than this share of their stroke hold nothing.
+EMPTY = 0.01
 
 
 class Router(Protocol):
@@ -48,29 +51,52 @@ class Router(Protocol):
         """The step was found in the scene and its action is being performed."""
         ...
 
+    def undo(self) -> None:
+        """The action of the step taken last was not carried out: the step before it was the last one."""
+        ...
+
 
 class AdvancingRouter:
-    """Goes through the first demonstration step by step and then stays at its last."""
+    """Goes through the first demonstration step by step and then stays at its last.
+
+    It goes back to the approach if the hand is empty that held something in the demonstration.
+    """
 
     def __init__(self) -> None:
-        self._length = 0
-        self._next = 0
+        self._steps: list[Transition] = []
+        self.reset()
 
     def watch(self, steps: Sequence[Transition]) -> None:
-        """Remember how many steps the first demonstration has."""
-        self._length = self._length or len(steps)
+        """Remember the first demonstration."""
+        self._steps = self._steps or list(steps)
 
     def reset(self) -> None:
         """Begin with the first step."""
-        self._next = 0
+        self._before = self._next = 0
 
     def route(self, query: Scene) -> tuple[int, int]:
-        """The step after the one taken last."""
-        return 0, self._next
+        """The step after the one taken last, or the approach to what was lost."""
+        lost = self._next > 0 and _is_empty(query.observation, self._steps[self._next].before.observation)
+        return 0, _approach(self._steps, self._next) if lost else self._next
 
     def took(self, demonstration: int, step: int) -> None:
         """The following step is next."""
-        self._next = min(step + 1, self._length - 1)
+        self._before, self._next = step, min(step + 1, len(self._steps) - 1)
+
+    def undo(self) -> None:
+        """The step taken last is next."""
+        self._next = self._before
+
+
+def _is_empty(observed: Observation, shown: Observation) -> bool:
+    """Whether the fingers closed on nothing, where they held something when it was shown."""
+    return observed.gripper_opening < EMPTY and shown.gripper_opening > 2 * EMPTY
+
+
+def _approach(steps: Sequence[Transition], step: int) -> int:
+    """The last step before one (other than the first) that comes to a thing with the hand open."""
+    opened = [k for k in range(step) if steps[k].action.gripper_open]
+    return opened[-1] if opened else 0
 
 
 @dataclass(frozen=True)
@@ -121,6 +147,7 @@ class LearnedRouter:
         self._last: tuple[int, int] | None = None
         self._asked: Scene | None = None
         self._before: Scene | None = None
+        self._undone: tuple[tuple[int, int] | None, Scene | None] = None, None
         self._taken: Counter[tuple[int, int]] = Counter()
 
     def route(self, query: Scene) -> tuple[int, int]:
@@ -133,8 +160,13 @@ class LearnedRouter:
 
     def took(self, demonstration: int, step: int) -> None:
         """The following step is expected next, and what was asked about last is the state before it."""
+        self._undone = self._last, self._before
         self._last, self._before = (demonstration, step), self._asked
         self._taken[self._last] += 1
+
+    def undo(self) -> None:
+        """The step before that taken last is the last one again."""
+        self._last, self._before = self._undone
 
     def scores(self, query: Scene) -> list[FloatArray]:
         """For each demonstration (L,) logarithms of its steps' probabilities."""

@@ -14,7 +14,7 @@ GROUND = ("table", "floor", "wall")
 
 
 def geoms_of(world: World, bodies: Collection[int]) -> tuple[IntArray, IntArray]:
-    """The geometries of bodies with these numbers, and all others that are seen or felt, without what all stands on."""
+    """The geometries of some bodies, and all others that are seen or felt but the ground."""
     m = world.model
     own = np.isin(m.geom_bodyid, list(bodies))
     ground = np.isin(m.geom_bodyid, [m.body(b).id for b in GROUND])

@@ -5,6 +5,7 @@ Which thing it is the disturber reads from the simulation and the expert's waypo
 
 import zlib
 from collections.abc import Collection, Sequence
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -109,9 +110,7 @@ class Disturber:
         """Whether the expert could take what was moved."""
         approach = _closing(self._waypoints) - 1
         steps = [w for w in self._task.waypoints(world)[approach:] if world.model.body(w.frame).id in bodies]
-        return all(
-            reachable(world, w.target(world), w.allow_collisions or self._task.insist) for w in steps
-        )
+        return all(reachable(world, w.target(world), w.allow_collisions or self._task.insist) for w in steps)
 
     def _shut(self, world: World) -> bool:
         """Push the first joint back that was moved; whether there was one."""
@@ -154,7 +153,7 @@ def can_happen(kind: str, task: Task, world: World) -> bool:
     if kind == "moved":
         first = _uppermost(world, m.body(frame).id)
         return bool(m.body_jntnum[first] == 0) or _is_free(world, m.body(first).name)
-    grasps = [b.frame for a, b in zip(waypoints, waypoints[1:], strict=False) if a.gripper_open > b.gripper_open]
+    grasps = [b.frame for a, b in pairwise(waypoints) if a.gripper_open and not b.gripper_open]
     return any(frame in world.graspable and _is_free(world, frame) for frame in grasps)
 
 
@@ -181,9 +180,7 @@ def _openable(world: World) -> dict[str, float]:
     joints = [
         m.joint(j).name
         for j in range(m.njnt)
-        if int(m.jnt_type[j]) in _MOVED
-        and m.jnt_stiffness[j] == 0
-        and int(m.jnt_bodyid[j]) in solid - arm
+        if int(m.jnt_type[j]) in _MOVED and m.jnt_stiffness[j] == 0 and int(m.jnt_bodyid[j]) in solid - arm
     ]
     return {name: world.joint(name) for name in joints}
 
@@ -224,12 +221,11 @@ def _above_table(world: World, geoms: Collection[int]) -> float:
     m = world.model
     top = np.flatnonzero(m.geom_bodyid == m.body("table").id)
     solid = [g for g in geoms if m.geom_contype[g] or m.geom_conaffinity[g]]
-    distances = [mujoco.mj_geomDistance(m, world.data, int(g), int(t), _FAR, None) for g in solid for t in top]
-    return max(min(distances), 0.0)
+    pairs = ((int(g), int(t)) for g in solid for t in top)
+    return float(max(min(mujoco.mj_geomDistance(m, world.data, *pair, _FAR, None) for pair in pairs), 0.0))
 
 
 def _hits_robot(world: World) -> bool:
     bodies = world.model.geom_bodyid[world.data.contact.geom[: world.data.ncon]]
     robot = np.isin(bodies, list(world.robot_bodies))
     return bool(np.any((robot[:, 0] != robot[:, 1]) & (world.data.contact.dist[: world.data.ncon] < -_DEPTH)))
-

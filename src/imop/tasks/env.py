@@ -228,7 +228,9 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
         try:
             watch = watching(self.task, self.on_frame)
             execute(self.world, to_action(action), on_frame=watch, insist=self.task.insist)
-            info["disturbed"] = self._disturber is not None and self._disturber.after_action(self.world, watch)
+            info["disturbed"] = self._disturber is not None and self._disturber.after_action(
+                self.world, watch
+            )
             info["success"] = self.task.success(self.world)
         except PlanFailed as error:
             info["plan_failed"] = error.reason
