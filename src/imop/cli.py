@@ -28,6 +28,7 @@ app = tyro.extras.SubcommandApp()
 # Names and messages may hold brackets and colons, which must be shown as they are.
 console = Console(markup=False, emoji=False, highlight=False)
 T = TypeVar("T")
+Disturb = Literal["", "moved", "knocked", "missed", "shut"]
 
 
 def _track(these: Sequence[T], doing: str) -> Iterable[T]:
@@ -57,6 +58,7 @@ def run(
     demo_episode: int = 0,
     method: str = "learned",
     change: Annotated[str, tyro.conf.arg(metavar="FACTOR,FACTOR")] = "",
+    disturb: Disturb = "",
     weights: Path | None = None,
     min_confidence: float = 0.0,
     video: bool = True,
@@ -79,6 +81,7 @@ def run(
         method: learned, routed, replay, registration, textbook, oracle (true object poses), or one's own,
             such as my_methods:MyPolicy.
         change: what the scene differs in from the demonstrated one, as in `imop eval`.
+        disturb: what goes wrong once, as in `imop eval`.
         weights: folder that `imop train` wrote; by default the bundled weights.
         min_confidence: stop instead of acting below this confidence, 0 to 1.
         video: whether to draw rollout.mp4, which takes longer than the task itself.
@@ -92,7 +95,7 @@ def run(
 
     writable_folder(out)
     factors = ",".join(changes_of({task: find_task(task)}, change)[task])
-    trial = Trial(task, seed, variation, instance, factors, shown)
+    trial = Trial(task, seed, variation, instance, factors, shown, disturb=disturb)
     if shown is not None:
         require_instances(task, "shown", f"{shown}", "nothing")
         if demo is not None:
@@ -167,8 +170,9 @@ def evaluate(
     instance: int = 0,
     instances: Literal["same", "other"] = "same",
     change: Annotated[str, tyro.conf.arg(metavar="FACTOR,FACTOR")] = "",
-    disturb: Literal["", "moved", "knocked", "missed", "shut"] = "",
+    disturb: Disturb = "",
     second_try: bool = False,
+    demonstrations: int = 1,
     jobs: int = 2,
     weights: Path | None = None,
     out: Path = Path("runs/eval"),
@@ -197,6 +201,7 @@ def evaluate(
             was taken is knocked out of the hand, missed by it, or what was opened is pushed shut.
         second_try: go on after a motion that cannot be planned, up to the task's limit of actions; always
             so if disturbed.
+        demonstrations: how many are shown, each but the first of another instance of the things.
         jobs: parallel processes.
         weights: folder that `imop train` wrote, for the learned policy; by default the bundled weights.
         out: folder for the results.
@@ -221,6 +226,7 @@ def evaluate(
         instances,
         disturb,
         second_try,
+        demonstrations,
     )
     results.save(out)
     console.print(results.table())

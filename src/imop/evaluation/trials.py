@@ -19,6 +19,8 @@ from imop.types import Demonstration
 DEMONSTRATION_SEED = 1_000_000
 """Demonstrations are recorded in scenes of this seed and above, and never tested there."""
 _RECORDING_ATTEMPTS = 20
+_OTHERS = 10 * DEMONSTRATION_SEED
+"""What further demonstrations add to the instance of the first."""
 
 
 @dataclass(frozen=True)
@@ -35,9 +37,10 @@ class Trial:
         shown_variation: of the task in the demonstration; None if it is the same.
         disturb: what goes wrong once, see `tasks.disturbances.DISTURBANCES`; nothing if empty.
         second_try: whether the episode goes on after a motion that cannot be planned. It does if disturbed.
+        demonstrations: how many are shown, all but the first of other instances that are never tested.
 
     Raises:
-        InvalidInput: for a negative seed, or an unknown change or disturbance.
+        InvalidInput: for a negative seed, no demonstration, or an unknown change or disturbance.
     """
 
     task: str
@@ -49,11 +52,14 @@ class Trial:
     shown_variation: int | None = None
     disturb: str = ""
     second_try: bool = False
+    demonstrations: int = 1
 
     def __post_init__(self) -> None:
         for name in ("seed", "instance", "shown"):
             if (getattr(self, name) or 0) < 0:
                 raise InvalidInput(name, f"{getattr(self, name)}", "a whole number from 0 on")
+        if self.demonstrations < 1:
+            raise InvalidInput("demonstrations", f"{self.demonstrations}", "at least 1")
         object.__setattr__(self, "change", ",".join(read_factors(self.change)))
         if self.disturb:
             require_disturbance(self.disturb)
@@ -110,10 +116,29 @@ def demonstration_for(trial: Trial) -> Demonstration:
         ExpertFailed: if the expert succeeds in none of the scenes it may choose from.
         NoRoom: if not even a scene was found.
     """
-    task, shown = make_task(trial.task), trial.demonstrated
-    for seed in range(DEMONSTRATION_SEED, DEMONSTRATION_SEED + _RECORDING_ATTEMPTS):
+    return _demonstration(trial, DEMONSTRATION_SEED, trial.demonstrated.instance)
+
+
+def demonstrations_for(trial: Trial) -> list[Demonstration]:
+    """All that is shown before the trial: that of `demonstration_for`, then those of other instances.
+
+    Raises:
+        ExpertFailed, NoRoom: as `demonstration_for`.
+    """
+    further = range(1, trial.demonstrations)
+    first = trial.demonstrated.instance
+    # Scenes and instances that no trial has: their seeds are below that of demonstrations.
+    return [demonstration_for(trial)] + [
+        _demonstration(trial, DEMONSTRATION_SEED + k * _RECORDING_ATTEMPTS, first + _OTHERS + k)
+        for k in further
+    ]
+
+
+def _demonstration(trial: Trial, first_seed: int, instance: int) -> Demonstration:
+    task = make_task(trial.task)
+    for seed in range(first_seed, first_seed + _RECORDING_ATTEMPTS):
         try:
-            recorded = record_demonstration(task, seed, shown.variation, shown.instance)
+            recorded = record_demonstration(task, seed, trial.demonstrated.variation, instance)
             return _seen(recorded, trial.changed.shown)
         except (ExpertFailed, NoRoom) as error:
             failure: ImopError = error
