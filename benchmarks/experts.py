@@ -30,6 +30,7 @@ class Options:
 
     Attributes:
         suite: which tasks.
+        split: which of these.
         tasks: only these, by their names without the suite; all if empty.
         seeds: scenes per task; scene i has seed `first + i` and takes the variations in turn.
         first: the first seed.
@@ -38,6 +39,7 @@ class Options:
     """
 
     suite: str = "tabletop"
+    split: str = "all"
     tasks: tuple[str, ...] = ()
     seeds: int = 50
     first: int = 0
@@ -70,7 +72,7 @@ def main() -> int:
     options = tyro.cli(Options, description=__doc__)
     console = Console()
     try:
-        names = chosen_tasks(options.suite, "all", options.tasks)
+        names = chosen_tasks(options.suite, options.split, options.tasks)
     except InvalidInput as error:
         console.print(f"[red]{error}")
         return 2
@@ -79,7 +81,9 @@ def main() -> int:
     attempts = list(parallel(work, options.jobs, console, "episodes"))
     by_task = {name.split("/")[1]: [a for a in attempts if a.task == name] for name in names}
     counts = {task: Count(sum(not a.problem for a in of), len(of)) for task, of in by_task.items()}
-    results = Results(options.suite, ",".join(options.tasks) or "all", options.first, {"expert": counts})
+    results = Results(
+        options.suite, ",".join(options.tasks) or options.split, options.first, {"expert": counts}
+    )
     console.print(results.table())
     failures = {task: {a.seed: a.problem for a in of if a.problem} for task, of in by_task.items()}
     seconds = {task: [a.seconds for a in of] for task, of in by_task.items()}

@@ -161,7 +161,7 @@ def test_eval_writes_the_same_table_as_json_and_markdown(tmp_path, capsys):
     arguments = ("--tasks", "lid_off_pot", "--episodes", 2, "--jobs", 1, "--out", tmp_path)
     assert imop("eval", "--methods", "replay,oracle,expert", *arguments) == 0
     results = json.loads((tmp_path / "results.json").read_text())
-    assert set(results) == {"suite", "split", "seed", "change", "instances", "methods"}
+    assert set(results) == {"suite", "split", "seed", "change", "instances", "disturb", "methods"}
     for method in ("oracle", "expert"):
         assert results["methods"][method]["tasks"]["lid_off_pot"] == {"successes": 2, "trials": 2}
     assert "lid_off_pot" in (tmp_path / "report.md").read_text()

@@ -25,6 +25,7 @@ from imop.training.recipe import RecipeName, make, refuse_others
 # Verbs import what they need when they run, so that --help does not wait for torch and MuJoCo.
 
 app = tyro.extras.SubcommandApp()
+Disturb = Literal["", "moved", "knocked", "missed", "shut"]
 
 
 @app.command
@@ -38,6 +39,7 @@ def run(
     demo_episode: int = 0,
     method: str = "learned",
     change: Annotated[str, tyro.conf.arg(metavar="FACTOR,FACTOR")] = "",
+    disturb: Disturb = "",
     weights: Path | None = None,
     min_confidence: float = 0.0,
     video: bool = True,
@@ -60,6 +62,7 @@ def run(
         method: learned, routed, paper, replay, registration, textbook, oracle (true object poses), or one's
             own, such as my_methods:MyPolicy.
         change: what the scene differs in from the demonstrated one, as in `imop eval`.
+        disturb: what goes wrong once, as in `imop eval`.
         weights: folder that `imop train` wrote; by default the bundled weights.
         min_confidence: stop instead of acting below this confidence, 0 to 1.
         video: whether to draw rollout.mp4, which takes longer than the task itself.
@@ -73,7 +76,7 @@ def run(
 
     writable_folder(out)
     factors = ",".join(changes_of({task: find_task(task)}, change)[task])
-    trial = Trial(task, seed, variation, instance, factors, shown)
+    trial = Trial(task, seed, variation, instance, factors, shown, disturb=disturb)
     if shown is not None:
         require_instances(task, "shown", f"{shown}", "nothing")
         if demo is not None:
@@ -148,6 +151,9 @@ def evaluate(
     instance: int = 0,
     instances: Literal["same", "other"] = "same",
     change: Annotated[str, tyro.conf.arg(metavar="FACTOR,FACTOR")] = "",
+    disturb: Disturb = "",
+    second_try: bool = False,
+    demonstrations: int = 1,
     jobs: int = 2,
     weights: Path | None = None,
     out: Path = Path("runs/eval"),
@@ -173,6 +179,11 @@ def evaluate(
         change: what the scenes differ in from the demonstrated ones, joined by commas: object_color,
             object_size, light, table_color, distractors, camera_pose, or all of these as all; errors of the
             sensors d415, calibration, knocked, fewer_cameras. docs/tasks.md says what they are.
+        disturb: what goes wrong once in every episode: what is about to be acted on is moved by 10 cm, what
+            was taken is knocked out of the hand, missed by it, or what was opened is pushed shut.
+        second_try: go on after a motion that cannot be planned, up to the task's limit of actions; always
+            so if disturbed.
+        demonstrations: how many are shown, each but the first of another instance of the things.
         jobs: parallel processes.
         weights: folder that `imop train` wrote, for the learned policy; by default the bundled weights.
         out: folder for the results.
@@ -195,6 +206,9 @@ def evaluate(
         weights,
         change,
         instances,
+        disturb,
+        second_try,
+        demonstrations,
     )
     results.save(out)
     console.print(results.table())

@@ -46,7 +46,7 @@ def test_every_pair_is_tried_once_and_the_demonstration_shows_the_other_grocery(
     assert {t.demonstrated.variation for t in tried[:2]} == {0}
     assert all(e.success for episodes in cells.values() for e in episodes)
     # What was tried is not tried again, and no demonstration is needed for it.
-    monkeypatch.setattr(benchmark, "demonstration_for", never)
+    monkeypatch.setattr(benchmark, "demonstrations_for", never)
     monkeypatch.setattr(benchmark, "attempt", never)
     assert measure(options(tmp_path), QUIET) == cells
     diagonal = measure(options(tmp_path, diagonal=True), QUIET)
@@ -67,7 +67,7 @@ def test_a_run_that_was_stopped_goes_on_and_other_code_begins_anew(tmp_path, mon
         return Episode(trial, method, state, True, "success")
 
     monkeypatch.setattr(benchmark, "attempt", attempt)
-    monkeypatch.setattr(benchmark, "demonstration_for", lambda trial: None)
+    monkeypatch.setattr(benchmark, "demonstrations_for", lambda trial: [None])
     with pytest.raises(KeyboardInterrupt):
         measure(options(tmp_path), QUIET)
     kept = [(e.trial, e.state) for e in read_episodes(tmp_path / "episodes.jsonl")]
@@ -115,7 +115,7 @@ def test_the_diagonal_and_the_rest_are_counted_apart_and_no_scene_is_no_trial():
 
 @pytest.mark.parametrize("wrong", [{"groceries": "stone"}, {"trials": 0}, {"method": "no_method"}])
 def test_what_cannot_be_tried_is_named_before_anything_is(tmp_path, wrong, monkeypatch):
-    monkeypatch.setattr(benchmark, "demonstration_for", never)
+    monkeypatch.setattr(benchmark, "demonstrations_for", never)
     with pytest.raises(InvalidInput, match=next(iter(wrong))):
         measure(options(tmp_path, **wrong), QUIET)
     assert not list(tmp_path.iterdir())

@@ -6,6 +6,7 @@ import pytest
 from imop.errors import NoConfidentMatch
 from imop.evaluation.told import Told
 from imop.policy.interfaces import Candidate
+from imop.policy.router import Option
 
 
 class Policy:
@@ -20,8 +21,8 @@ class Policy:
     def see(self, observation):
         return observation
 
-    def route(self, scene):
-        return 0, 7
+    def options(self, scene):
+        return (Option(0, 7),)
 
     def took(self, demonstration, step):
         self.heard.append(step)

@@ -11,57 +11,86 @@ from hypothesis import strategies as st
 from imop.geometry import se3
 from imop.networks.graph import GraphConfig
 from imop.networks.model import Model, ModelConfig
-from imop.policy.router import AdvancingRouter, LearnedRouter, Odds, prior
+from imop.policy.router import AdvancingRouter, LearnedRouter, Odds, Option, prior
 from tests.networks.test_routing import ROUTING
 from tests.policy.scenes import BLUE, RED, above, at, box, moved, scene, transitions
 
 HOME = above(0, 0, 1)
 LENGTH = 4
+UNSURE = np.full(LENGTH, 1 / LENGTH)
 STATE = scene([], HOME)
 STEPS = transitions([STATE] * 4, [(HOME, True)] * 3)
+
+
+def go(router, query=STATE):
+    """Take the first option; asking twice gives the same."""
+    found = router.options(query)
+    assert found == router.options(query)
+    router.took(found[0].demonstration, found[0].step)
+    return found[0].demonstration, found[0].step
 
 
 def test_steps_follow_each_other_once_taken_and_the_last_stays():
     router = AdvancingRouter()
     router.watch(STEPS)
-    seen = []
-    for _ in range(5):
-        assert router.route(STATE) == router.route(STATE)
-        seen.append(router.route(STATE))
-        router.took(*seen[-1])
-    assert seen == [(0, 0), (0, 1), (0, 2), (0, 2), (0, 2)]
+    assert [go(router) for _ in range(5)] == [(0, 0), (0, 1), (0, 2), (0, 2), (0, 2)]
     router.reset()
-    assert router.route(STATE) == (0, 0)
+    assert go(router) == (0, 0)
 
 
-def test_the_first_demonstration_counts():
+def test_what_was_not_carried_out_is_next_again():
+    for router in (AdvancingRouter(), Told(UNSURE)):
+        router.watch(STEPS)
+        seen = []
+        for carried_out in (True, False, False, True):
+            seen.append(go(router)[1])
+            if not carried_out:
+                router.undo()
+        assert seen == [0, 1, 1, 1] and go(router)[1] == 2
+        router.reset()
+        go(router)
+        router.undo()
+        assert go(router)[1] == 0
+
+
+def test_the_first_step_decides_which_demonstration_is_followed():
     router = AdvancingRouter()
+    router.watch(STEPS[:2])
     router.watch(STEPS)
-    router.watch(STEPS[:1])
-    for _ in range(2):
-        router.took(*router.route(STATE))
-    assert router.route(STATE) == (0, 2)
+    assert router.options(STATE) == (Option(0, 0), Option(1, 0))
+    router.took(1, 0)
+    assert [go(router) for _ in range(3)] == [(1, 1), (1, 2), (1, 2)]
+
+
+def test_what_is_not_in_the_hand_is_taken_anew():
+    """Open, open, close, lift, let go: the hand is empty after closing, or later on the way."""
+    openings, actions = (1.0, 1.0, 1.0, 0.4, 0.4), (True, True, False, False, True)
+    states = [scene([], HOME, opening) for opening in (*openings, 1.0)]
+    router = AdvancingRouter()
+    router.watch(transitions(states, [(HOME, wanted) for wanted in actions]))
+    held, thin, empty = (scene([], HOME, opening) for opening in (0.4, 0.05, 0.0))
+    for lost_after, query in ((2, empty), (3, empty), (2, thin), (3, held)):
+        router.reset()
+        router.took(0, lost_after)
+        assert go(router, query)[1] == (1 if query is empty else lost_after + 1)
 
 
 class Told(LearnedRouter):
     """Hears the network's probabilities from the test."""
 
-    def __init__(self, odds=None):
+    def __init__(self, *probabilities, odds=None):
         super().__init__(None, odds)
-        self.probabilities = None
+        self.probabilities = probabilities
+
+    def watch(self, steps):
+        pass
 
     def scores(self, query):
         return [np.log(np.asarray(p, dtype=float)) for p in self.probabilities]
 
     def go(self, *probabilities):
         self.probabilities = probabilities
-        found = self.route(None)
-        assert found == self.route(None)
-        self.took(*found)
-        return found
-
-
-UNSURE = np.full(LENGTH, 1 / LENGTH)
+        return go(self, None)
 
 
 def sure(step, doubt=1e-6):
@@ -103,11 +132,16 @@ def test_what_is_done_already_is_skipped_only_with_certainty():
     assert Told().go(sure(2, 1e-2)) == (0, 0)
 
 
-def test_the_demonstration_that_fits_is_followed():
-    router = Told()
-    assert router.go(0.1 * sure(0), sure(0)) == (1, 0)
-    assert router.go(sure(1), 0.3 * sure(1)) == (1, 1)
-    assert router.go(sure(2), 1e-3 * sure(2)) == (0, 2)
+def test_of_several_demonstrations_one_is_followed_until_it_fails():
+    router = Told(sure(0), 3 * sure(0))
+    assert [(o.demonstration, o.step) for o in router.options(None)] == [(0, 0), (1, 0)]
+    assert len({round(o.weight, 6) for o in router.options(None)}) == 1
+    router.took(1, 0)
+    router.probabilities = sure(1), sure(1)
+    assert [(o.demonstration, o.step) for o in router.options(None)] == [(1, 1)]
+    router.took(1, 1)
+    router.probabilities = sure(0), sure(0)
+    assert {o.demonstration for o in router.options(None)} == {0, 1}
 
 
 @given(st.lists(st.integers(0, LENGTH - 1), min_size=1, max_size=40))
@@ -143,7 +177,7 @@ def test_it_knows_what_was_seen_before_the_last_action(router):
     found = [fresh]
     for before in (STATES[0], STATES[3]):
         router.reset()
-        router.route(before)
+        router.options(before)
         np.testing.assert_array_equal(router.scores(STATES[1])[0], fresh)
         router.took(0, 0)
         found.append(router.scores(STATES[1])[0])

@@ -26,7 +26,7 @@ def never(*_):
 def logged(tmp_path, monkeypatch):
     """A log in which learned solves every second scene and replay all."""
     monkeypatch.setattr(benchmark, "attempt", never)
-    monkeypatch.setattr(benchmark, "demonstration_for", never)
+    monkeypatch.setattr(benchmark, "demonstrations_for", never)
     log = EpisodeLog(tmp_path / LOG)
     for of_task in SECTION.trials(4, 20).values():
         for trial in of_task:

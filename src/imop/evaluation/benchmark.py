@@ -1,6 +1,7 @@
 """Success rates of several methods on the same demonstrations and scenes."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -14,20 +15,30 @@ from imop.evaluation.methods import make_policy
 from imop.evaluation.pointing import pointing
 from imop.evaluation.report import Count, Instances, Results
 from imop.evaluation.rollout import rollout
-from imop.evaluation.trials import Trial, change_notes, demonstration_for, most_actions, suite_trials
+from imop.evaluation.trials import (
+    Trial,
+    change_notes,
+    demonstrations_for,
+    disturbed,
+    most_actions,
+    suite_trials,
+)
 from imop.policy.one_shot import OneShotPolicy
+from imop.tasks.disturbances import DISTURBANCES
 from imop.tasks.expert import ExpertFailed, perform
 from imop.tasks.layout import NoRoom
 from imop.types import Demonstration
 
 NOTES = (
-    "One demonstration per task and variation, from a scene that is never tested.",
+    "Demonstrations are per task and variation, from scenes that are never tested.",
     "The networks of learned saw synthetic pairs and base tasks with other objects; others saw nothing.",
     "replay, registration and learned see four 128 x 128 RGB-D views, camera poses, joint positions and "
     "the gripper; no segmentation, names or object poses.",
     "oracle carries the demonstrated poses over by the true object pose; expert reads everything.",
-    "A motion that cannot be planned ends the episode as failed.",
 )
+
+ENDS = "A motion that cannot be planned ends the episode as failed."
+SECOND_TRY = "An episode goes on after a motion that cannot be planned, up to the task's limit of actions."
 
 
 SAME = (
@@ -51,6 +62,9 @@ def evaluate_suite(
     weights: Path | None = None,
     change: str = "",
     instances: Instances = "same",
+    disturb: str = "",
+    second_try: bool = False,
+    demonstrations: int = 1,
 ) -> Results:
     """Try every method in the same `episodes` scenes of every task.
 
@@ -68,13 +82,22 @@ def evaluate_suite(
         weights: of the learned policy; None for the bundled ones.
         change: what the scenes differ in, names of `tasks.changes.FACTORS` joined by commas.
         instances: whether the scenes show the demonstrated objects or others of their kind.
+        disturb: what goes wrong once in every episode, one of `tasks.disturbances.DISTURBANCES`, if any.
+        second_try: whether an episode goes on after a motion that cannot be planned, as a disturbed one does.
+        demonstrations: how many are shown, each but the first of another instance.
 
     Raises:
-        InvalidInput: for an unknown suite, split, task, method or change, or other instances where there are
-            none.
+        InvalidInput: for an unknown suite, split, task, method, change or disturbance, no demonstration, or
+            other instances where there are none.
         CorruptData: if the log cannot be read.
     """
     trials = suite_trials(suite, split, tasks, episodes, seed, instance, change, instances == "other")
+    trials = {
+        task: [replace(trial, second_try=second_try, demonstrations=demonstrations) for trial in of_task]
+        for task, of_task in trials.items()
+    }
+    without = set(trials)
+    trials = disturbed(trials, disturb) if disturb else trials
     everything = [trial for of_task in trials.values() for trial in of_task]
     found = tried(everything, methods, jobs, console, log, weights)
     counts = {
@@ -82,8 +105,23 @@ def evaluate_suite(
         for method in methods
     }
     names = ",".join(tasks) or split
-    notes = (*NOTES, OTHER if instances == "other" else SAME, *change_notes(trials, change))
-    return Results(suite, names, seed, counts, notes, change, instances)
+    notes = [*NOTES, SECOND_TRY if second_try or disturb else ENDS, OTHER if instances == "other" else SAME]
+    notes += [f"Shown were {demonstrations} demonstrations, each of another instance."] * (demonstrations > 1)
+    notes += change_notes(trials, change)
+    if disturb:
+        notes += disturbance_notes(disturb, found, sorted(without - set(trials)))
+    return Results(suite, names, seed, counts, tuple(notes), change, instances, disturb)
+
+
+def disturbance_notes(
+    disturb: str, episodes: Mapping[tuple[Trial, str], Episode], without: Sequence[str]
+) -> list[str]:
+    """What a disturbance means, how often it happened, and in which tasks it cannot."""
+    notes = [f"{disturb}: {DISTURBANCES[disturb]}"]
+    for method in dict.fromkeys(method for _, method in episodes):
+        own = [e for (_, m), e in episodes.items() if m == method and e.success is not None]
+        notes.append(f"With {method} it happened in {sum(e.disturbed for e in own)} of {len(own)} episodes.")
+    return notes + [f"It cannot happen in {', '.join(without)}."] * bool(without)
 
 
 def tried(
@@ -126,37 +164,44 @@ def tried(
 
 def attempt(
     trial: Trial,
-    demonstration: Demonstration,
+    shown: Sequence[Demonstration],
     method: str,
     state: str,
     weights: Path | None = None,
     focus: bool = False,
 ) -> Episode:
-    """How a method that was shown the demonstration does in one scene; for the arguments see `tried`."""
+    """How a method that was shown some demonstrations does in one scene; for the arguments see `tried`."""
     try:
         env = trial.env()
     except NoRoom as error:
         return Episode(trial, method, state, None, str(error))
     try:
+        first, *others = shown
         if method == "expert":
             perform(env.task, env.world)
-            return Episode(trial, method, state, True, "success", len(demonstration))
+            return Episode(trial, method, state, True, "success", len(first))
         policy = make_policy(method, env.world, weights=weights)
-        point = pointing(demonstration) if focus else None
+        point = pointing(first) if focus else None
         if point is not None:
             assert isinstance(policy, OneShotPolicy)
-            meant = point(0, demonstration.keyframes[0].observation)
-            policy.watch(demonstration.stripped(), meant)
+            policy.watch(first.stripped(), point(0, first.keyframes[0].observation))
+        elif method == "oracle":
+            policy.watch(first)
         else:
-            policy.watch(demonstration if method == "oracle" else demonstration.stripped())
-        result = rollout(env, policy, most_actions(method, demonstration, env.task), point=point)
+            for demonstration in (first, *others):
+                policy.watch(demonstration.stripped())
+        result = rollout(env, policy, most_actions(method, first, trial, env.task), point=point)
     except (MissingExtra, AssetMissing):
         raise  # says nothing about the method
+    except NoRoom as error:
+        return Episode(trial, method, state, None, str(error))
     except ImopError as error:
         # What a policy cannot handle it has failed at; the other methods and scenes go on.
         return Episode(trial, method, state, False, str(error), error=not isinstance(error, ExpertFailed))
     decisions = tuple((step.generator, step.confidence) for step in result.steps)
-    return Episode(trial, method, state, result.success, result.reason, len(result.steps), decisions)
+    happened = any(step.disturbed for step in result.steps)
+    ended = result.success, result.reason, len(result.steps), decisions
+    return Episode(trial, method, state, *ended, disturbed=happened)
 
 
 def count_of(episodes: Iterable[Episode]) -> Count:
@@ -165,15 +210,15 @@ def count_of(episodes: Iterable[Episode]) -> Count:
     return Count(sum(known), len(known))
 
 
-def shown_together(trial: Trial) -> tuple[str, int, int, str]:
-    """What trials with the same demonstration have in common."""
+def shown_together(trial: Trial) -> tuple[str, int, int, str, int]:
+    """What trials with the same demonstrations have in common."""
     shown = trial.demonstrated
-    return shown.task, shown.variation, shown.instance, shown.change
+    return shown.task, shown.variation, shown.instance, shown.change, shown.demonstrations
 
 
 def _demonstrations(
     trials: list[Trial], jobs: int, console: Console
-) -> dict[tuple[str, int, int, str], Demonstration]:
+) -> dict[tuple[str, int, int, str, int], list[Demonstration]]:
     wanted = {shown_together(trial): trial for trial in trials}
-    work = [delayed(demonstration_for)(trial) for trial in wanted.values()]
+    work = [delayed(demonstrations_for)(trial) for trial in wanted.values()]
     return dict(zip(wanted, parallel(work, jobs, console, "demonstrations"), strict=True))

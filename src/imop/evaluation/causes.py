@@ -114,7 +114,7 @@ def diagnose(
         panel = Panel(keyframe, observation, action, f"{trial.task} seed {trial.seed} step {step}")
         acted.append(_Acted(step, off, _on_object(demonstration, action, step, in_demonstration), panel))
 
-    result = rollout(env, policy, most_actions(method, demonstration, env.task), on_action=on_action)
+    result = rollout(env, policy, most_actions(method, demonstration, trial, env.task), on_action=on_action)
     return None if result.success else _first(acted, result)
 
 

@@ -36,6 +36,7 @@ class Episode:
         actions: how many were taken.
         decisions: who proposed each action, and with which probability of being right.
         error: whether it ended because something could not be handled, which counts as a failure.
+        disturbed: whether the disturbance of the trial happened.
     """
 
     trial: Trial
@@ -46,6 +47,7 @@ class Episode:
     actions: int = 0
     decisions: tuple[tuple[str, float], ...] = ()
     error: bool = False
+    disturbed: bool = False
 
 
 class EpisodeLog:

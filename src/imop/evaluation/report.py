@@ -46,6 +46,7 @@ class Results:
         notes: what a reader must know to compare the numbers, one sentence each.
         change: what the scenes differed in from the demonstrated ones; nothing but poses if empty.
         instances: whether the scenes showed the demonstrated objects or others of their kind.
+        disturb: what went wrong once in every episode; nothing if empty.
     """
 
     suite: str
@@ -55,6 +56,7 @@ class Results:
     notes: tuple[str, ...] = ()
     change: str = ""
     instances: Instances = "same"
+    disturb: str = ""
 
     def average(self, method: str) -> float:
         """Mean of the tasks' success rates."""
@@ -74,7 +76,7 @@ class Results:
             for name, tasks in self.counts.items()
         }
         head = {"suite": self.suite, "split": self.split, "seed": self.seed, "change": self.change}
-        return {**head, "instances": self.instances, "methods": methods}
+        return {**head, "instances": self.instances, "disturb": self.disturb, "methods": methods}
 
     def rows(self) -> list[list[str]]:
         """Header and one row per task, then the average."""
@@ -88,7 +90,8 @@ class Results:
     @property
     def _changed(self) -> str:
         other = ", other instances" if self.instances == "other" else ""
-        return other + (f", changed: {self.change}" if self.change else "")
+        changed = f", changed: {self.change}" if self.change else ""
+        return other + changed + (f", disturbed: {self.disturb}" if self.disturb else "")
 
     def markdown(self) -> str:
         """The table with its conditions, as Markdown."""

@@ -28,6 +28,7 @@ class Step:
         plan_failed: reason, if no motion was found.
         generator: who proposed the motion, see `policy/proposals.py`; empty if nobody competed.
         reachable: whether the arm can go there; None if that was not asked.
+        disturbed: whether something went wrong after it through no fault of the policy.
     """
 
     support_step: int | None
@@ -39,6 +40,7 @@ class Step:
     plan_failed: str | None = None
     generator: str = ""
     reachable: bool | None = None
+    disturbed: bool = False
 
 
 @dataclass(frozen=True)
@@ -103,13 +105,14 @@ def rollout(
                 info.get("plan_failed"),
                 action.match.generator if action.match else "",
                 action.reachable,
+                bool(info.get("disturbed")),
             )
         )
         if info.get("success"):
             return Rollout(True, "success", tuple(taken))
-        if info.get("plan_failed"):
+        if terminated:
             return Rollout(False, f"no motion ({info['plan_failed']})", tuple(taken))
-        if terminated or truncated:
+        if truncated:
             break
     if taken and env.wait():
         return Rollout(True, "success", tuple(taken))

@@ -73,7 +73,7 @@ def perform(
         expert.took(step, action)
         panels.append(Panel(demonstration.keyframes[step], observation, action, f"step {step}"))
 
-    result = rollout(env, policy, most_actions(method, demonstration, env.task), expert, on_action)
+    result = rollout(env, policy, most_actions(method, demonstration, trial, env.task), expert, on_action)
     save_json({**asdict(trial), "method": method, **result.as_dict()}, out / "result.json")
     if panels:
         save_picture(panels, out / "steps.png")

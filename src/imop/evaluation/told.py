@@ -26,7 +26,7 @@ class Told:
     def act(self, observation: Observation, step: int) -> Action:
         """The action of a step in what is seen now; errors are those of `OneShotPolicy.act`."""
         scene = self._policy.see(observation)
-        self.routed = self._policy.router.route(scene)[1]
+        self.routed = self._policy.router.options(scene)[0].step
         self._policy.router.took(0, step)
         action = self._policy.locate(scene, step, progress=self._progress)
         assert action.match is not None

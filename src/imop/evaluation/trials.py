@@ -8,6 +8,7 @@ from imop.errors import ImopError, InvalidInput
 from imop.evaluation.splits import chosen_tasks
 from imop.sim.sensing import Sensing
 from imop.tasks.changes import FACTORS, Change, changes_of, read_factors
+from imop.tasks.disturbances import can_happen, require_disturbance
 from imop.tasks.env import ImopEnv, make_task
 from imop.tasks.expert import ExpertFailed, record_demonstration
 from imop.tasks.layout import NoRoom
@@ -18,6 +19,8 @@ from imop.types import Demonstration
 DEMONSTRATION_SEED = 1_000_000
 """Demonstrations are recorded in scenes of this seed and above, and never tested there."""
 _RECORDING_ATTEMPTS = 20
+_OTHERS = 10 * DEMONSTRATION_SEED
+"""What further demonstrations add to the instance of the first."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +35,12 @@ class Trial:
         change: names of `tasks.changes.FACTORS`, joined by commas; what the scene differs in.
         shown: that of the demonstration; None if it is the same.
         shown_variation: of the task in the demonstration; None if it is the same.
+        disturb: what goes wrong once, see `tasks.disturbances.DISTURBANCES`; nothing if empty.
+        second_try: whether the episode goes on after a motion that cannot be planned. It does if disturbed.
+        demonstrations: how many are shown, all but the first of other instances that are never tested.
 
     Raises:
-        InvalidInput: for a negative seed, or an unknown change.
+        InvalidInput: for a negative seed, no demonstration, or an unknown change or disturbance.
     """
 
     task: str
@@ -44,12 +50,20 @@ class Trial:
     change: str = ""
     shown: int | None = None
     shown_variation: int | None = None
+    disturb: str = ""
+    second_try: bool = False
+    demonstrations: int = 1
 
     def __post_init__(self) -> None:
         for name in ("seed", "instance", "shown"):
             if (getattr(self, name) or 0) < 0:
                 raise InvalidInput(name, f"{getattr(self, name)}", "a whole number from 0 on")
+        if self.demonstrations < 1:
+            raise InvalidInput("demonstrations", f"{self.demonstrations}", "at least 1")
         object.__setattr__(self, "change", ",".join(read_factors(self.change)))
+        if self.disturb:
+            require_disturbance(self.disturb)
+            object.__setattr__(self, "second_try", True)
 
     @cached_property
     def changed(self) -> Change:
@@ -82,7 +96,13 @@ class Trial:
         """
         if not 0 <= self.seed < DEMONSTRATION_SEED:
             raise InvalidInput("seed", f"{self.seed}", f"0 .. {DEMONSTRATION_SEED - 1}")
-        env = ImopEnv(self.make_task(), change=self.changed, sense=self.changed.tested)
+        env = ImopEnv(
+            self.make_task(),
+            change=self.changed,
+            sense=self.changed.tested,
+            disturb=self.disturb,
+            second_try=self.second_try,
+        )
         env.reset(seed=self.seed, options={"variation": self.variation, "instance_seed": self.instance})
         return env
 
@@ -96,10 +116,29 @@ def demonstration_for(trial: Trial) -> Demonstration:
         ExpertFailed: if the expert succeeds in none of the scenes it may choose from.
         NoRoom: if not even a scene was found.
     """
-    task, shown = make_task(trial.task), trial.demonstrated
-    for seed in range(DEMONSTRATION_SEED, DEMONSTRATION_SEED + _RECORDING_ATTEMPTS):
+    return _demonstration(trial, DEMONSTRATION_SEED, trial.demonstrated.instance)
+
+
+def demonstrations_for(trial: Trial) -> list[Demonstration]:
+    """All that is shown before the trial: that of `demonstration_for`, then those of other instances.
+
+    Raises:
+        ExpertFailed, NoRoom: as `demonstration_for`.
+    """
+    further = range(1, trial.demonstrations)
+    first = trial.demonstrated.instance
+    # Scenes and instances that no trial has: their seeds are below that of demonstrations.
+    return [demonstration_for(trial)] + [
+        _demonstration(trial, DEMONSTRATION_SEED + k * _RECORDING_ATTEMPTS, first + _OTHERS + k)
+        for k in further
+    ]
+
+
+def _demonstration(trial: Trial, first_seed: int, instance: int) -> Demonstration:
+    task = make_task(trial.task)
+    for seed in range(first_seed, first_seed + _RECORDING_ATTEMPTS):
         try:
-            recorded = record_demonstration(task, seed, shown.variation, shown.instance)
+            recorded = record_demonstration(task, seed, trial.demonstrated.variation, instance)
             return _seen(recorded, trial.changed.shown)
         except (ExpertFailed, NoRoom) as error:
             failure: ImopError = error
@@ -158,6 +197,31 @@ def suite_trials(
     }
 
 
+def disturbed(trials: Mapping[str, Sequence[Trial]], disturb: str) -> dict[str, list[Trial]]:
+    """The same scenes, disturbed; tasks in which that cannot happen are left out.
+
+    Raises:
+        InvalidInput: for an unknown disturbance, or one that can happen in none of the tasks.
+    """
+    found = {
+        task: [replace(trial, disturb=disturb) for trial in of_task]
+        for task, of_task in trials.items()
+        if _can_happen(disturb, of_task[0])
+    }
+    if not found:
+        raise InvalidInput("disturb", f"{disturb} of {', '.join(trials)}", "a task in which that can happen")
+    return found
+
+
+def _can_happen(disturb: str, trial: Trial) -> bool:
+    require_disturbance(disturb)
+    try:
+        env = trial.env()
+    except NoRoom:
+        return True  # another scene of the task will tell
+    return can_happen(disturb, env.task, env.world)
+
+
 def require_instances(task: str, field: str, value: str, accepted: str) -> None:
     """Refuse a value that asks for another instance of the things of a task.
 
@@ -181,6 +245,6 @@ def change_notes(trials: Mapping[str, Sequence[Trial]], change: str) -> list[str
     return [*(f"{factor}: {FACTORS[factor]}" for factor in wanted), *without]
 
 
-def most_actions(method: str, demonstration: Demonstration, task: Task) -> int:
-    """As many as were demonstrated, or as the task allows to a method that can go back to a step."""
-    return task.step_limit if method in ("routed", "paper") else len(demonstration)
+def most_actions(method: str, demonstration: Demonstration, trial: Trial, task: Task) -> int:
+    """As many as were demonstrated, or as the task allows to those who may try again."""
+    return task.step_limit if method in ("routed", "paper") or trial.second_try else len(demonstration)

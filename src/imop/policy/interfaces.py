@@ -149,15 +149,30 @@ class Transition:
 
 
 @dataclass(frozen=True, eq=False)
+class Tried:
+    """A pose of the gripper that was tried for a step, in vain.
+
+    Attributes:
+        T_world_gripper: (4, 4).
+        luck: 0 .. 1, how likely it would have come to nothing if it had been right.
+    """
+
+    T_world_gripper: FloatArray
+    luck: float
+
+
+@dataclass(frozen=True, eq=False)
 class Progress:
     """What an episode did so far.
 
     Attributes:
         T_last: (4, 4) the motion that was found for the step before, from the demonstrated scene into the
             observed one; None at the beginning.
+        tried: poses of the step in question that came to nothing before.
     """
 
     T_last: FloatArray | None = None
+    tried: tuple[Tried, ...] = ()
 
 
 BEGINNING = Progress()

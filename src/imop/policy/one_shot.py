@@ -23,7 +23,8 @@ from imop.policy.interfaces import (
     Transition,
 )
 from imop.policy.learned import LearnedMatcher
-from imop.policy.router import AdvancingRouter, LearnedRouter, Router
+from imop.policy.recovery import Attempts
+from imop.policy.router import AdvancingRouter, LearnedRouter, Option, Router
 from imop.types import Action, Demonstration, FloatArray, Match, Observation
 
 # The tip is kept this far above the ground, metres, if it was shown above it. What would be deeper in the
@@ -66,8 +67,10 @@ class OneShotPolicy:
         self._prepared: list[list[PreparedStep]] = []
         self._cameras: set[str] = set()
         self._camera_errors: dict[str, FloatArray] = {}
-        self._progress = BEGINNING
+        self._progress: dict[int, Progress] = {}
+        self._before = self._progress
         self._last: Scene | None = None
+        self._attempts = Attempts()
 
     @classmethod
     def from_pretrained(
@@ -103,6 +106,8 @@ class OneShotPolicy:
     def watch(self, demonstration: Demonstration, focus: Focus | None = None) -> None:
         """Take in a demonstration; a further call adds another one.
 
+        Of several, the one is followed whose first step is found again with the highest probability.
+
         Args:
             demonstration: what was shown.
             focus: the thing in the first observation that is acted on first, if somebody says so; it is
@@ -130,11 +135,14 @@ class OneShotPolicy:
 
     def reset(self) -> None:
         """Begin a new episode."""
-        self._progress, self._last = BEGINNING, None
+        self._progress, self._before = {}, {}
+        self._last, self._attempts = None, Attempts()
         self.router.reset()
 
     def act(self, observation: Observation, focus: Focus | None = None) -> Action:
         """The action for what is seen now, with its confidence and the matched points.
+
+        If the arm is not where the last action sent it, that step is tried again, elsewhere.
 
         Args:
             observation: what is seen.
@@ -153,12 +161,37 @@ class OneShotPolicy:
                 "views", f"camera {missing[0]} is missing", f"all of {', '.join(sorted(self._cameras))}"
             )
         query = self.see(observation, focus, self._last)
-        number, step = self.router.route(query)
-        action = self.locate(query, step, number, self._progress)
-        self.router.took(number, step)
+        if not self._attempts.arrived(observation):
+            self.router.undo()
+            self._progress = self._before
+        option, action = self._likeliest(query, self.router.options(query))
+        self.router.took(option.demonstration, option.step)
+        self._attempts.took(option, action.T_world_gripper)
         assert action.match is not None
-        self._progress, self._last = Progress(action.match.T_query_support), query
+        self._before = self._progress
+        self._progress = {option.demonstration: Progress(action.match.T_query_support)}
+        self._last = query
         return action
+
+    def _likeliest(self, query: Scene, options: Sequence[Option]) -> tuple[Option, Action]:
+        """The step that is most plausible and most likely found, and its action.
+
+        Raises:
+            NoConfidentMatch: if none is found with enough confidence.
+        """
+        found, failure = [], NoConfidentMatch(0.0, self._min_confidence)
+        for option in options:
+            # What was done before was another motion in the scene of another demonstration.
+            progress = self._progress.get(option.demonstration, BEGINNING)
+            tried = self._attempts.go_on(option)
+            try:
+                progress = replace(progress, tried=tried)
+                found.append((option, self.locate(query, option.step, option.demonstration, progress)))
+            except NoConfidentMatch as error:
+                failure = error
+        if not found:
+            raise failure
+        return max(found, key=lambda pair: pair[0].weight * pair[1].confidence)
 
     def see(
         self, observation: Observation, focus: Focus | None = None, earlier: Scene | None = None

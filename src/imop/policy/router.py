@@ -8,15 +8,16 @@ episode says enters as odds:
 - the step after the one taken last: 1;
 - a step before that, since an action can fail: `back`;
 - any step after it, since what a step would do may be done already: `skip`;
-- the same in another demonstration than the one followed so far: times `change`.
+- the same in another demonstration than the one followed so far: times `change`, unless that one failed.
 
 The product of odds and the network's probability decides. A step that was taken 1 + `retries` times is only
-taken again where it is the expected one, so that an episode goes on.
+taken again where it is the expected one, so that an episode goes on. Of several demonstrations both routers
+name those that are about as plausible; which one it is the policy decides by how well each is found again.
 """
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -26,11 +27,32 @@ from imop.networks.changes import change_graph, compared
 from imop.networks.model import Model
 from imop.networks.routing import Described, States, make_states
 from imop.policy.interfaces import Scene, Transition
-from imop.types import FloatArray
+from imop.types import BoolArray, FloatArray, Observation
+
+# Fingers that are open by less than this share of their stroke hold nothing.
+EMPTY = 0.01
+
+
+# Of several demonstrations those are options that are at least so plausible, against the most plausible one.
+PLAUSIBLE = 0.1
+
+
+@dataclass(frozen=True)
+class Option:
+    """A step that may come now.
+
+    Attributes:
+        demonstration, step: its numbers.
+        weight: how plausible it is, against other options.
+    """
+
+    demonstration: int
+    step: int
+    weight: float = 1.0
 
 
 class Router(Protocol):
-    """Chooses a demonstration and one of its steps."""
+    """Chooses steps of demonstrations."""
 
     def watch(self, steps: Sequence[Transition]) -> None:
         """Take note of a further demonstration."""
@@ -40,37 +62,67 @@ class Router(Protocol):
         """A new episode begins."""
         ...
 
-    def route(self, query: Scene) -> tuple[int, int]:
-        """Number of the demonstration and of its step that fit the query; asking changes nothing."""
+    def options(self, query: Scene) -> tuple[Option, ...]:
+        """Steps that may come now, at most one of each demonstration; asking changes nothing."""
         ...
 
     def took(self, demonstration: int, step: int) -> None:
         """The step was found in the scene and its action is being performed."""
         ...
 
+    def undo(self) -> None:
+        """The action of the step taken last was not carried out: the step before it was the last one."""
+        ...
+
 
 class AdvancingRouter:
-    """Goes through the first demonstration step by step and then stays at its last."""
+    """Goes through one demonstration step by step and then stays at its last.
+
+    Which one, the first step decides. It goes back to the approach if the hand is empty that held something
+    in the demonstration.
+    """
 
     def __init__(self) -> None:
-        self._length = 0
-        self._next = 0
+        self._demonstrations: list[list[Transition]] = []
+        self.reset()
 
     def watch(self, steps: Sequence[Transition]) -> None:
-        """Remember how many steps the first demonstration has."""
-        self._length = self._length or len(steps)
+        """Remember a demonstration."""
+        self._demonstrations.append(list(steps))
 
     def reset(self) -> None:
-        """Begin with the first step."""
-        self._next = 0
+        """Begin with the first step, of any demonstration."""
+        self._last: tuple[int, int] | None = None
+        self._undone: tuple[int, int] | None = None
 
-    def route(self, query: Scene) -> tuple[int, int]:
-        """The step after the one taken last."""
-        return 0, self._next
+    def options(self, query: Scene) -> tuple[Option, ...]:
+        """The step after the one taken last, or the approach to what was lost."""
+        if self._last is None:
+            return tuple(Option(number, 0) for number in range(len(self._demonstrations)))
+        number, step = self._last
+        steps = self._demonstrations[number]
+        following = min(step + 1, len(steps) - 1)
+        lost = _is_empty(query.observation, steps[following].before.observation)
+        return (Option(number, _approach(steps, following) if lost else following),)
 
     def took(self, demonstration: int, step: int) -> None:
         """The following step is next."""
-        self._next = min(step + 1, self._length - 1)
+        self._undone, self._last = self._last, (demonstration, step)
+
+    def undo(self) -> None:
+        """The step taken last is next."""
+        self._last = self._undone
+
+
+def _is_empty(observed: Observation, shown: Observation) -> bool:
+    """Whether the fingers closed on nothing, where they held something when it was shown."""
+    return observed.gripper_opening < EMPTY and shown.gripper_opening > 2 * EMPTY
+
+
+def _approach(steps: Sequence[Transition], step: int) -> int:
+    """The last step before one (other than the first) that comes to a thing with the hand open."""
+    opened = [k for k in range(step) if steps[k].action.gripper_open]
+    return opened[-1] if opened else 0
 
 
 @dataclass(frozen=True)
@@ -94,6 +146,12 @@ def prior(odds: Odds, expected: int, length: int) -> FloatArray:
     """(length,) odds of the steps of a demonstration if step `expected`, or none any more, comes next."""
     ahead = np.arange(length) - min(expected, length - 1)
     return np.where(ahead < 0, odds.back, np.where(ahead > 0, odds.skip, 1.0))
+
+
+def _normalized(scores: FloatArray) -> FloatArray:
+    """(L,) probabilities, from their logarithms up to a constant."""
+    p = np.exp(scores - scores.max())
+    return np.asarray(p / p.sum())
 
 
 class LearnedRouter:
@@ -121,20 +179,40 @@ class LearnedRouter:
         self._last: tuple[int, int] | None = None
         self._asked: Scene | None = None
         self._before: Scene | None = None
+        self._undone: tuple[tuple[int, int] | None, Scene | None] = None, None
         self._taken: Counter[tuple[int, int]] = Counter()
 
-    def route(self, query: Scene) -> tuple[int, int]:
-        """The demonstration and step with the largest product of odds and probability."""
+    def options(self, query: Scene) -> tuple[Option, ...]:
+        """The step with the largest product of odds and probability, of every plausible demonstration."""
         self._asked = query
         scores = self.scores(query)
-        posterior = [np.log(self._prior(n, len(seen))) + seen for n, seen in enumerate(scores)]
-        number = int(np.argmax([p.max() for p in posterior]))
-        return number, int(posterior[number].argmax())
+        chances = [self._prior(len(seen)) * _normalized(seen) for seen in scores]
+        for number, chance in enumerate(chances):
+            chance[self._worn(number, len(chance))] *= 1e-12
+        found = [Option(n, int(chance.argmax()), float(chance.max())) for n, chance in enumerate(chances)]
+        return tuple(self._plausible(found))
+
+    def _plausible(self, options: Sequence[Option]) -> list[Option]:
+        """Those of the demonstration that is followed, and of others if it failed."""
+        if self._last is not None:
+            followed, last = self._last
+            failed = options[followed].step <= last
+            change = 1.0 if failed else self._odds.change
+            options = [
+                o if o.demonstration == followed else replace(o, weight=change * o.weight) for o in options
+            ]
+        best = max(option.weight for option in options)
+        return [option for option in options if option.weight >= PLAUSIBLE * best]
 
     def took(self, demonstration: int, step: int) -> None:
         """The following step is expected next, and what was asked about last is the state before it."""
+        self._undone = self._last, self._before
         self._last, self._before = (demonstration, step), self._asked
         self._taken[self._last] += 1
+
+    def undo(self) -> None:
+        """The step before that taken last is the last one again."""
+        self._last, self._before = self._undone
 
     def scores(self, query: Scene) -> list[FloatArray]:
         """For each demonstration (L,) logarithms of its steps' probabilities."""
@@ -152,15 +230,15 @@ class LearnedRouter:
     def _expected(self) -> int:
         return 0 if self._last is None else self._last[1] + 1
 
-    def _prior(self, number: int, length: int) -> FloatArray:
+    def _prior(self, length: int) -> FloatArray:
         """(L,) odds of the steps of a demonstration in the episode so far."""
-        odds, expected = self._odds, self._expected
-        steps = prior(odds, expected, length)
-        worn = np.array([self._taken[number, step] > odds.retries for step in range(length)])
-        worn[min(expected, length - 1)] = False
-        steps[worn] = 1e-12
-        followed = number if self._last is None else self._last[0]
-        return steps * (1.0 if number == followed else odds.change)
+        return prior(self._odds, self._expected, length)
+
+    def _worn(self, number: int, length: int) -> BoolArray:
+        """(L,) which steps of a demonstration were taken too often; never the one that is expected."""
+        worn = np.array([self._taken[number, step] > self._odds.retries for step in range(length)])
+        worn[min(self._expected, length - 1)] = False
+        return worn
 
     def _states(self, scenes: Sequence[Scene], before: Sequence[Scene]) -> States:
         """States of what is seen, each with what was seen before it."""

@@ -66,14 +66,15 @@ class StepSearch:
         ranked: tuple[Candidate, ...] = ()
         pool: Pool | None = None
         for pool in self.pools(query, progress):
-            ranked = self._reachable_first(pool.ranked(), feasible)
+            ranked = self._reachable_first(pool.ranked(progress.tried), feasible)
             enough = ranked and ranked[0].probability >= self.sought.config.enough
             if enough and ranked[0].reachable is not False:
                 break
         if pool is None or not ranked:
             return ()
         best, *others = ranked
-        return pool.explained(pool.settled(best)), *others
+        # What is settled anew would come to where it came to before.
+        return pool.explained(best if progress.tried else pool.settled(best)), *others
 
     def _reachable_first(
         self, ranked: tuple[Candidate, ...], feasible: Feasible | None

@@ -16,7 +16,7 @@ from imop.geometry.icp import CLOSE, FINEST
 from imop.geometry.ransac import distinct
 from imop.networks.verification import VerificationNetwork
 from imop.policy.evidence import Template, crowd, glance, palette, shares
-from imop.policy.interfaces import Candidate, PolicyConfig, Transition
+from imop.policy.interfaces import Candidate, PolicyConfig, Transition, Tried
 from imop.policy.proposals import Asked, Matches, Turns
 from imop.policy.region import Region
 from imop.policy.target import REACH, Target, obstacles
@@ -24,6 +24,8 @@ from imop.types import BoolArray, FloatArray
 
 # Candidates that take the gripper farther apart than this, metres and radians, are rivals.
 ELSEWHERE = (0.02, 0.26)
+# Who takes the gripper nearer than this to where it was in vain, metres and radians, tries the same again.
+SAME_TRY = (0.02, np.radians(10.0))
 # A point that is explained by more than this has a counterpart.
 FOUND = 0.3
 
@@ -223,11 +225,18 @@ class Pool:
         motions = np.stack(self.motions)[order]
         return [motions[i] for i in distinct(motions, self._sought.center, count)]
 
-    def ranked(self) -> tuple[Candidate, ...]:
-        """All candidates, likeliest first, without those that are about the same as a likelier one."""
+    def ranked(self, tried: Sequence[Tried] = ()) -> tuple[Candidate, ...]:
+        """All candidates, likeliest first, without those that are about the same as a likelier one.
+
+        Args:
+            tried: poses that came to nothing; what leads there is less likely to be right.
+        """
         if not self.motions:
             return ()
         p = self.probabilities()
+        for one in tried:
+            again = se3.near(self.goals(), one.T_world_gripper, *SAME_TRY)
+            p = np.where(again, p * one.luck / (p * one.luck + 1.0 - p + 1e-12), p)
         order = np.argsort(-p, kind="stable")
         motions = np.stack(self.motions)[order]
         kept = distinct(motions, self._sought.center, len(motions))

@@ -3,19 +3,18 @@
 from dataclasses import replace
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from imop.geometry import se3
-from imop.sim.cameras import VISIBLE_GROUPS
 from imop.sim.parts.grocery import GROCERIES, grocery
 from imop.sim.parts.shapes import add_to
 from imop.sim.parts.solids import trinket
 from imop.sim.world import TABLE_HEIGHT, World
+from imop.tasks.clear import geoms_of, is_clear
 from imop.tasks.colors import random_color
 from imop.tasks.layout import Area, NoRoom
 from imop.tasks.task import Task
-from imop.types import FloatArray, IntArray
+from imop.types import FloatArray
 
 _PREFIX = "distractor"
 _PARKED = (4.0, 3.0)
@@ -61,35 +60,15 @@ def place_distractors(task: Task, world: World, rng: np.random.Generator) -> Non
 
 def _place(world: World, name: str, way: FloatArray, rng: np.random.Generator) -> None:
     area, parked = Area(), world.pose(name)
-    own, others = _geoms(world, name)
+    own, others = geoms_of(world, [world.model.body(name).id])
     for _ in range(_TRIES):
         x, y, yaw = rng.uniform(*area.x), rng.uniform(*area.y), rng.uniform(-np.pi, np.pi)
         if _distance_to_way(np.array([x, y]), way[:, :2]) < _HAND:
             continue
         world.set_free_pose(name, se3.make(se3.euler(z=yaw), (x, y, TABLE_HEIGHT + parked[2, 3])))
-        if _is_clear(world, own, others):
+        if is_clear(world, own, others, _CLEARANCE):
             return
     raise NoRoom(f"{name}: no free place on the table in {_TRIES} tries")
-
-
-def _geoms(world: World, name: str) -> tuple[IntArray, IntArray]:
-    """The geometries of a body, and all others that are seen or felt, without what it stands on."""
-    m = world.model
-    body, ground = m.body(name).id, [m.body(b).id for b in ("table", "floor", "wall")]
-    there = (m.geom_contype != 0) | ((VISIBLE_GROUPS[m.geom_group] != 0) & (m.geom_rgba[:, 3] > 0))
-    others = there & (m.geom_bodyid != body) & ~np.isin(m.geom_bodyid, ground)
-    own, other = np.flatnonzero(m.geom_bodyid == body), np.flatnonzero(others)
-    return own.astype(np.int32), other.astype(np.int32)
-
-
-def _is_clear(world: World, own: IntArray, others: IntArray) -> bool:
-    m, d = world.model, world.data
-    apart = np.linalg.norm(d.geom_xpos[own][:, None] - d.geom_xpos[others][None], axis=2)
-    near = apart < m.geom_rbound[own][:, None] + m.geom_rbound[others][None] + _CLEARANCE
-    return not any(
-        mujoco.mj_geomDistance(m, d, int(own[i]), int(others[k]), _CLEARANCE, None) < _CLEARANCE
-        for i, k in np.argwhere(near)
-    )
 
 
 def _distance_to_way(p: FloatArray, way: FloatArray) -> float:

@@ -14,6 +14,7 @@ from imop.sim.execute import execute
 from imop.sim.gripper import OnFrame
 from imop.sim.motion import WORKSPACE_LOWER, WORKSPACE_UPPER
 from imop.sim.world import World
+from imop.tasks.disturbances import Disturber
 from imop.tasks.suites import find_task
 from imop.tasks.task import SceneChange, Task, make_scene, wait, watching
 from imop.types import Action, CameraView, FloatArray, Observation, as_array
@@ -119,7 +120,8 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
     `reset(seed=..., options={"variation": ..., "instance_seed": ...})`: the seed decides poses and clutter;
     the instance seed decides shapes, sizes and colours and is the seed unless given. The reward is 1 when
     the aim is reached, which ends the episode. So does a motion that cannot be planned, with reward 0 and
-    `info["plan_failed"]` the reason. `info["success"]` says whether the aim is reached.
+    `info["plan_failed"]` the reason, unless there is a second try. `info["success"]` says whether the aim is
+    reached, `info["disturbed"]` whether the episode was disturbed in this step.
 
     Args:
         task: is built anew at every reset.
@@ -128,6 +130,8 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
         on_frame: called with the world every 0.05 simulated seconds.
         change: of every scene, if any.
         sense: looks at the world at a time step; `observation_space` describes the robot's own cameras.
+        disturb: what goes wrong once in every episode, see `disturbances.DISTURBANCES`; nothing if empty.
+        second_try: whether the episode goes on after a motion that cannot be planned. Nothing moves then.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 (Gymnasium's name and type)
@@ -140,9 +144,13 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
         on_frame: OnFrame | None = None,
         change: SceneChange | None = None,
         sense: Callable[[World, int], Observation] = observe,
+        disturb: str = "",
+        second_try: bool = False,
     ):
         self.task, self.variation, self.on_frame = task, variation, on_frame
         self._change, self._sense = change, sense
+        self._disturb, self._second_try = disturb, second_try
+        self._disturber: Disturber | None = None
         self._step_limit = step_limit or task.step_limit
         self._world: World | None = None
         self._observation: Observation | None = None
@@ -187,7 +195,7 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
         """Make a new scene.
 
         Raises:
-            InvalidInput: if an option or the variation is unknown.
+            InvalidInput: if an option, the variation or the disturbance is unknown.
         """
         super().reset(seed=seed)
         given = dict(options or {})
@@ -197,6 +205,8 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
         if given:
             raise InvalidInput("options", ", ".join(map(str, given)), "variation, instance_seed")
         self._world = make_scene(self.task, variation, instance, episode, self._change)
+        disturb = self._disturb
+        self._disturber = Disturber(disturb, self.task, self._world, episode) if disturb else None
         info = {
             "success": False,
             "variation": variation,
@@ -211,16 +221,20 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
 
         Raises:
             InvalidInput: if the action is malformed, or before the first reset.
+            NoRoom: if what a disturbance moves finds no place.
         """
         steps = self.observation.time_step + 1
-        info: dict[str, Any] = {"success": False}
+        info: dict[str, Any] = {"success": False, "disturbed": False}
         try:
             watch = watching(self.task, self.on_frame)
             execute(self.world, to_action(action), on_frame=watch, insist=self.task.insist)
+            info["disturbed"] = self._disturber is not None and self._disturber.after_action(
+                self.world, watch
+            )
             info["success"] = self.task.success(self.world)
         except PlanFailed as error:
             info["plan_failed"] = error.reason
-        terminated = info["success"] or "plan_failed" in info
+        terminated = info["success"] or ("plan_failed" in info and not self._second_try)
         return self._observe(steps), float(info["success"]), terminated, steps >= self._step_limit, info
 
     def wait(self) -> bool:

@@ -7,16 +7,30 @@ from typing import Any
 
 from imop import plugins
 from imop.errors import InvalidInput
-from imop.tasks import rlbench
-from imop.tasks.tabletop import BASE, CROSS_OBJECT, NOVEL, TABLETOP
+from imop.tasks import rlbench, tabletop
 from imop.tasks.task import Task
 
 Suite = Mapping[str, Mapping[str, type[Task]]]
-"""Split -> "suite/name" of a task -> the task; the split "all" has every task."""
+"""Split -> "suite/name" of a task -> the task.
+
+The split "all" has every task but those that are made of others: "chain", "chain_novel" and "long".
+"""
 
 SUITES: dict[str, Suite] = {
-    "tabletop": {"base": BASE, "novel": NOVEL, "cross_object": CROSS_OBJECT, "all": TABLETOP},
-    "rlbench": {"base": rlbench.BASE, "novel": rlbench.NOVEL, "all": rlbench.RLBENCH},
+    "tabletop": {
+        "base": tabletop.BASE,
+        "novel": tabletop.NOVEL,
+        "cross_object": tabletop.CROSS_OBJECT,
+        "chain": tabletop.CHAIN,
+        "chain_novel": tabletop.CHAIN_NOVEL,
+        "all": tabletop.TABLETOP,
+    },
+    "rlbench": {
+        "base": rlbench.BASE,
+        "novel": rlbench.NOVEL,
+        "long": rlbench.LONG,
+        "all": rlbench.RLBENCH,
+    },
 }
 
 _SUITE = "a mapping split -> name -> imop.Task, named module:SUITE or by an entry point imop.suites"
@@ -55,8 +69,12 @@ def _suite(name: str, found: Any) -> Suite:
         split: {f"{name}/{task}": _task(f"{name}/{task}", kind) for task, kind in tasks.items()}
         for split, tasks in splits
     }
-    everything = {task: kind for tasks in suite.values() for task, kind in tasks.items()}
-    return {**suite, "all": everything}
+    return {**suite, "all": every_task(suite)}
+
+
+def every_task(suite: Suite) -> dict[str, type[Task]]:
+    """The tasks of all splits by their names."""
+    return {name: kind for tasks in suite.values() for name, kind in tasks.items()}
 
 
 def find_task(name: str) -> type[Task]:
@@ -66,7 +84,7 @@ def find_task(name: str) -> type[Task]:
         InvalidInput: if there is none, or it is no task.
     """
     suite = _known(name.rpartition("/")[0])
-    tasks = {} if suite is None else suite["all"]
+    tasks = {} if suite is None else every_task(suite)
     if name in tasks:
         return tasks[name]
     found = None if tasks and ":" in name else plugins.find("task", name, "imop.tasks")
@@ -76,7 +94,7 @@ def find_task(name: str) -> type[Task]:
 
 
 def _nearest(name: str, tasks: Mapping[str, type[Task]]) -> str:
-    known = [*tasks] or [task for suite in SUITES.values() for task in suite["all"]]
+    known = [*tasks] or [task for suite in SUITES.values() for task in every_task(suite)]
     near = get_close_matches(name, known, n=3, cutoff=0.4) or known[:1]
     return f"a task such as {', '.join(near)} (`imop tasks --suite` lists those of {', '.join(SUITES)})"
 

@@ -14,6 +14,7 @@ from imop.tasks.rlbench.hit_ball_with_queue import HitBallWithQueue
 from imop.tasks.rlbench.insert_onto_square_peg import InsertOntoSquarePeg
 from imop.tasks.rlbench.lamp_on import LampOn
 from imop.tasks.rlbench.light_bulb_in import LightBulbIn
+from imop.tasks.rlbench.long import PlaceThreeCups, StackFourBlocks
 from imop.tasks.rlbench.meat_off_grill import MeatOffGrill
 from imop.tasks.rlbench.open_box import OpenBox
 from imop.tasks.rlbench.open_door import OpenDoor
@@ -92,3 +93,11 @@ NOVEL: dict[str, type[Task]] = {
 }
 
 RLBENCH: dict[str, type[Task]] = {**BASE, **NOVEL}
+
+LONG: dict[str, type[Task]] = {
+    "rlbench/block_pyramid": BlockPyramid,
+    "rlbench/stack_four_blocks": StackFourBlocks,
+    "rlbench/stack_cups": StackCups,
+    "rlbench/place_three_cups": PlaceThreeCups,
+}
+"""Tasks and variations of more than one thing; apart from the others, so that no scene counts twice."""

@@ -4,6 +4,16 @@ Networks train on the base tasks and are tested on the novel ones, which share n
 """
 
 from imop.tasks.tabletop.book_in_shelf import BookInShelf
+from imop.tasks.tabletop.chains import (
+    ButtonsCubes,
+    ButtonsJarCup,
+    ItemButtons,
+    JarCup,
+    RingButtonsJar,
+    RingCupCubes,
+    RubbishLaptopPot,
+    RubbishPot,
+)
 from imop.tasks.tabletop.close_jar import CloseJar
 from imop.tasks.tabletop.close_laptop import CloseLaptop
 from imop.tasks.tabletop.cup_on_hook import CupOnHook
@@ -46,3 +56,19 @@ CROSS_OBJECT: dict[str, type[Task]] = {
 """Demonstrated with one object, tried with another."""
 
 TABLETOP: dict[str, type[Task]] = {**BASE, **NOVEL, **CROSS_OBJECT}
+
+CHAIN: dict[str, type[Task]] = {
+    "tabletop/chain_buttons_cubes": ButtonsCubes,
+    "tabletop/chain_item_buttons": ItemButtons,
+    "tabletop/chain_jar_cup": JarCup,
+    "tabletop/chain_buttons_jar_cup": ButtonsJarCup,
+    "tabletop/chain_ring_buttons_jar": RingButtonsJar,
+    "tabletop/chain_ring_cup_cubes": RingCupCubes,
+}
+"""Two or three of the base tasks in one scene."""
+
+CHAIN_NOVEL: dict[str, type[Task]] = {
+    "tabletop/chain_rubbish_pot": RubbishPot,
+    "tabletop/chain_rubbish_laptop_pot": RubbishLaptopPot,
+}
+"""Two or three of the novel tasks in one scene."""
