@@ -100,11 +100,30 @@ def test_a_suite_that_is_not_there_is_said(tmp_path):
     assert measured.tasks == ("open_drawer", "stack_cubes")  # the published ones are left
 
 
-def test_what_trials_do_not_know_is_not_measured(tmp_path):
-    row = Row("other", "replay", demonstrations=3, disturb="by no one")
-    table = replace(TABLE, sections=(replace(SECTION, rows=(row,)),))
-    (measured,) = measure(table, Options(tmp_path, seed=20), QUIET).sections
-    assert measured.rows[0].missing and measured.rows[0].counts is None
+def test_scenes_in_which_no_disturbance_happened_do_not_count(tmp_path, monkeypatch):
+    def tried(trials, methods, *_):
+        return {
+            (t, m): Episode(t, m, "s", True, "r", disturbed=t.seed % 2 == 0) for t in trials for m in methods
+        }
+
+    monkeypatch.setattr(run, "tried", tried)
+    moved = Row("replay, moved", "replay", disturb="moved", demonstrations=3)
+    table = replace(TABLE, sections=(replace(SECTION, rows=(REPLAY, moved)),))
+    (section,) = measure(table, Options(tmp_path, seed=20), QUIET).sections
+    still, disturbed = section.rows
+    assert set(still.counts.values()) == {Count(4, 4)} and set(disturbed.counts.values()) == {Count(2, 2)}
+    assert disturbed.pairs.kept == Count(2 * len(disturbed.counts), 2 * len(disturbed.counts))
+
+
+def test_a_row_changes_nothing_but_what_it_names_in_its_scenes():
+    scenes = SECTION.trials(2, 20)
+    three = Row("three", "learned", demonstrations=3).tried_in(scenes)
+    assert LEARNED.tried_in(scenes) == scenes
+    assert all(trial.demonstrations == 3 for of_task in three.values() for trial in of_task)
+    usual = {task: [replace(trial, demonstrations=1) for trial in of_task] for task, of_task in three.items()}
+    assert usual == scenes
+    with pytest.raises(InvalidInput, match="disturb"):
+        Row("none", "learned", disturb="by no one").tried_in(scenes)
 
 
 @pytest.mark.parametrize("episodes", [0, -1])

@@ -14,7 +14,7 @@ import imop
 from imop.evaluation.fingerprint import code_digest
 from imop.networks.model import BUNDLED, WEIGHTS
 
-_UNTRAINED = ("replay", "textbook", "oracle", "expert")
+_TRAINED = ("learned", "routed", "paper")
 
 
 @cache
@@ -47,10 +47,10 @@ def parameters(method: str, weights: str) -> int | None:
         weights: the folder; the bundled one if empty.
 
     Returns:
-        None for a method without networks, or if the file is not there.
+        None for a method that has other networks or none, or if the file is not there.
     """
     file = (Path(weights) if weights else BUNDLED) / WEIGHTS
-    if method in _UNTRAINED or not file.is_file():
+    if method not in _TRAINED or not file.is_file():
         return None
     with safe_open(file, "pt") as tensors:
         shapes: list[list[int]] = [tensors.get_slice(name).get_shape() for name in tensors.keys()]  # noqa: SIM118

@@ -192,8 +192,7 @@ def _logged(row: Row, trials: Mapping[str, list[Trial]], focus: bool, log: Episo
 
 def _outcome(episode: Episode) -> bool | None:
     """Whether it succeeded; None if there was no scene, or what should have disturbed it did not happen."""
-    happened = not getattr(episode.trial, "disturb", "") or getattr(episode, "disturbed", True)
-    return episode.success if happened else None
+    return None if episode.trial.disturb and not episode.disturbed else episode.success
 
 
 @cache

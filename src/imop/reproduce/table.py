@@ -1,14 +1,12 @@
 """What a table measures: rows of methods, on sections of tasks, and the published rows beside."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-import imop.evaluation.trials
-from imop.errors import InvalidInput
 from imop.evaluation.report import Instances
-from imop.evaluation.trials import Trial, suite_trials
+from imop.evaluation.trials import Trial, disturbed, suite_trials
 from imop.reproduce.published import Published
 from imop.sim.parts.grocery import GROCERIES
 from imop.tasks.suites import find_suite
@@ -48,20 +46,13 @@ class Row:
         """The same scenes, as this row has them; tasks in which its disturbance cannot happen are left out.
 
         Raises:
-            InvalidInput: if episodes cannot be disturbed so, or not so many demonstrations be shown.
+            InvalidInput: for an unknown disturbance, or one that can happen in no task.
         """
-        found = dict(scenes)
-        if self.disturb:
-            disturbed = getattr(imop.evaluation.trials, "disturbed", None)
-            if disturbed is None:
-                raise InvalidInput("disturb", f"{self.disturb} is not there yet", "nothing")
-            found = disturbed(found, self.disturb)
-        if self.demonstrations != 1:
-            if "demonstrations" not in {field.name for field in fields(Trial)}:
-                raise InvalidInput("demonstrations", f"{self.demonstrations} are not there yet", "1")
-            shown: dict[str, Any] = {"demonstrations": self.demonstrations}
-            found = {task: [replace(trial, **shown) for trial in these] for task, these in found.items()}
-        return found
+        found = disturbed(scenes, self.disturb) if self.disturb else scenes
+        return {
+            task: [replace(trial, demonstrations=self.demonstrations) for trial in of_task]
+            for task, of_task in found.items()
+        }
 
 
 @dataclass(frozen=True)

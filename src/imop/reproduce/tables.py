@@ -6,20 +6,18 @@ from imop.errors import InvalidInput
 from imop.reproduce import published
 from imop.reproduce.table import GrocerySection, Row, Section, SuiteSection, Table
 
-BASELINES = Path("runs/baselines")
 PROTOCOL = Path("runs/protocol")
 ABLATIONS = Path("runs/ablations")
 
 _TRAINED = f"python -m imop.training.protocol --out {PROTOCOL} makes them"
 _ABLATED = f"python -m imop.training.ablations --out {ABLATIONS} makes them, see docs/training.md"
-_FITTED = f"docs/baselines.md says how {BASELINES} is trained"
 
 LEARNED, REGISTRATION = Row("learned", "learned"), Row("registration", "registration")
 PAPER = Row("paper", "paper")
 LEARNED_RLBENCH = Row("learned, trained on RLBench", "learned", PROTOCOL, _TRAINED)
 PAPER_RLBENCH = Row("paper, trained on RLBench", "paper", PROTOCOL, _TRAINED)
-ACT3D, RVT = Row("act3d", "act3d", BASELINES, _FITTED), Row("rvt", "rvt", BASELINES, _FITTED)
-RVT_FT, RVT_HDT = Row("rvt_ft", "rvt_ft", BASELINES, _FITTED), Row("rvt_hdt", "rvt_hdt", BASELINES, _FITTED)
+ACT3D, RVT = Row("act3d", "act3d"), Row("rvt", "rvt")
+RVT_FT, RVT_HDT = Row("rvt_ft", "rvt_ft"), Row("rvt_hdt", "rvt_hdt")
 
 _OURS = (LEARNED, REGISTRATION, PAPER)
 _ON_RLBENCH = (*_OURS, LEARNED_RLBENCH, PAPER_RLBENCH)
