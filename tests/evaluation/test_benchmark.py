@@ -3,9 +3,10 @@ from joblib.externals.loky import get_reusable_executor
 from rich.console import Console
 
 from imop.errors import InvalidInput, MissingExtra
+from imop.evaluation import benchmark
 from imop.evaluation.benchmark import evaluate_suite, tried
 from imop.evaluation.episodes import read_episodes
-from imop.evaluation.trials import Trial
+from imop.evaluation.trials import Trial, demonstrations_for, suite_trials
 
 MODULE = """
 from imop.errors import InvalidInput, MissingExtra
@@ -68,3 +69,14 @@ def test_nobody_points_out_things_to_what_does_not_look(method, tmp_path):
             [Trial("tabletop/lid_off_pot", 0)], [method], 1, Console(quiet=True), tmp_path / "log", focus=True
         )
     assert error.value.field == "focus" and not (tmp_path / "log").exists()
+
+
+def test_what_one_policy_does_does_not_depend_on_its_episodes_before():
+    """Policies are kept for all scenes of a demonstration; a new one does the same in the last of them."""
+    trials = suite_trials("tabletop", "all", ("lid_off_pot",), 2, 0, 0)["lid_off_pot"]
+    key = benchmark.shown_together(trials[0])
+    shown = benchmark.Shown(key, tuple(demonstrations_for(trials[0])))
+    kept = [benchmark.attempt(trial, shown, "learned", "state") for trial in trials]
+    benchmark._watched.cache_clear()
+    assert benchmark.attempt(trials[1], shown, "learned", "state") == kept[1]
+    assert benchmark._watched.cache_info().misses == 1

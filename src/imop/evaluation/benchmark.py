@@ -1,8 +1,8 @@
 """Success rates of several methods on the same demonstrations and scenes."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
-from functools import cache
+from dataclasses import dataclass, field, replace
+from functools import cache, lru_cache
 from pathlib import Path
 
 from joblib import delayed
@@ -11,7 +11,7 @@ from rich.console import Console
 from imop.errors import AssetMissing, ImopError, InvalidInput, MissingExtra
 from imop.evaluation.episodes import Episode, EpisodeLog, method_state
 from imop.evaluation.jobs import parallel
-from imop.evaluation.methods import make_policy
+from imop.evaluation.methods import Policy, make_policy
 from imop.evaluation.pointing import pointing
 from imop.evaluation.report import Count, Instances, Results
 from imop.evaluation.rollout import rollout
@@ -124,6 +124,19 @@ def disturbance_notes(
     return notes + [f"It cannot happen in {', '.join(without)}."] * bool(without)
 
 
+@dataclass(frozen=True)
+class Shown:
+    """What a policy is shown.
+
+    Attributes:
+        key: by which it is told from others, see `shown_together`.
+        demonstrations: one or more.
+    """
+
+    key: tuple[str, int, int, str, int]
+    demonstrations: tuple[Demonstration, ...] = field(compare=False)
+
+
 def tried(
     trials: Sequence[Trial],
     methods: Sequence[str],
@@ -153,6 +166,8 @@ def tried(
     wanted = [(trial, method, state(trial.task, method)) for trial in trials for method in methods]
     missing = [one for one in wanted if known.find(*one) is None]
     shown = _demonstrations([trial for trial, _, _ in missing], jobs, console)
+    # Who has watched a demonstration acts in all of its scenes before another one is watched.
+    missing.sort(key=lambda one: (shown_together(one[0]), one[1]))
     work = [
         delayed(attempt)(one[0], shown[shown_together(one[0])], *one[1:], weights, focus) for one in missing
     ]
@@ -164,7 +179,7 @@ def tried(
 
 def attempt(
     trial: Trial,
-    shown: Sequence[Demonstration],
+    shown: Shown,
     method: str,
     state: str,
     weights: Path | None = None,
@@ -176,20 +191,16 @@ def attempt(
     except NoRoom as error:
         return Episode(trial, method, state, None, str(error))
     try:
-        first, *others = shown
+        first = shown.demonstrations[0]
         if method == "expert":
             perform(env.task, env.world)
             return Episode(trial, method, state, True, "success", len(first))
-        policy = make_policy(method, env.world, weights=weights)
         point = pointing(first) if focus else None
-        if point is not None:
-            assert isinstance(policy, OneShotPolicy)
-            policy.watch(first.stripped(), point(0, first.keyframes[0].observation))
-        elif method == "oracle":
+        if method == "oracle":
+            policy = make_policy(method, env.world)
             policy.watch(first)
         else:
-            for demonstration in (first, *others):
-                policy.watch(demonstration.stripped())
+            policy = _watched(shown, method, state, weights, focus)
         result = rollout(env, policy, most_actions(method, first, trial, env.task), point=point)
     except (MissingExtra, AssetMissing):
         raise  # says nothing about the method
@@ -210,6 +221,22 @@ def count_of(episodes: Iterable[Episode]) -> Count:
     return Count(sum(known), len(known))
 
 
+@lru_cache(maxsize=1)
+def _watched(shown: Shown, method: str, state: str, weights: Path | None, focus: bool) -> Policy:
+    """A policy that was shown the demonstrations, for watching takes as long as an episode.
+
+    The state tells it from one of other weights in the same folder.
+    """
+    policy, (first, *others) = make_policy(method, weights=weights), shown.demonstrations
+    if focus:
+        assert isinstance(policy, OneShotPolicy)
+        policy.watch(first.stripped(), pointing(first)(0, first.keyframes[0].observation))
+    else:
+        for demonstration in (first, *others):
+            policy.watch(demonstration.stripped())
+    return policy
+
+
 def shown_together(trial: Trial) -> tuple[str, int, int, str, int]:
     """What trials with the same demonstrations have in common."""
     shown = trial.demonstrated
@@ -218,7 +245,8 @@ def shown_together(trial: Trial) -> tuple[str, int, int, str, int]:
 
 def _demonstrations(
     trials: list[Trial], jobs: int, console: Console
-) -> dict[tuple[str, int, int, str, int], list[Demonstration]]:
+) -> dict[tuple[str, int, int, str, int], Shown]:
     wanted = {shown_together(trial): trial for trial in trials}
     work = [delayed(demonstrations_for)(trial) for trial in wanted.values()]
-    return dict(zip(wanted, parallel(work, jobs, console, "demonstrations"), strict=True))
+    recorded = parallel(work, jobs, console, "demonstrations")
+    return {key: Shown(key, tuple(these)) for key, these in zip(wanted, recorded, strict=True)}
