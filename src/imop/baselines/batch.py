@@ -75,6 +75,7 @@ def batch_of(
         T = np.stack([random_motion(pose, rng) for pose in rows["pose"]])
         rows["points"] = rows["points"] @ np.swapaxes(T[:, :3, :3], 1, 2) + T[:, None, :3, 3]
         rows["gripper"], rows["pose"] = T @ rows["gripper"], T @ rows["pose"]
+    rows["words"] = samples.words[samples.episode[numbers]]
     for name in ("gripper_open", "allow_collisions"):
         rows[name] = rows[name].astype(np.float32)
     return _tensors(Inputs, rows), _tensors(Targets, rows)

@@ -1,8 +1,8 @@
 """A regressor in the manner of Act3D (Gervet et al. 2023, arXiv 2306.17817).
 
 Ghost points are sampled in space, all over the workspace first, then twice more around the best one. Each
-attends to features of the scene, by relative positions (rotary), and is scored against a query that knows the
-words and the gripper. The best of the last is the place; rotation, gripper and collisions follow from its
+attends to features of the scene, by relative positions (rotary), and is scored against the token of the gripper,
+which has attended to the words and the scene. The best of the last is the place; rotation, gripper and collisions follow from its
 feature.
 
 What differs: features of the scene come from groups of points of the cloud instead of pretrained images'.
@@ -37,13 +37,13 @@ class PointsConfig:
     """
 
     width: int = 96
-    heads: int = 4
+    heads: int = 2
     layers: int = 3
     asking: int = 2
-    groups: tuple[int, int] = (8, 2)
-    near: tuple[int, int] = (96, 192)
-    ghosts: int = 256
-    tried: int = 2048
+    groups: tuple[int, int] = (16, 2)
+    near: tuple[int, int] = (64, 128)
+    ghosts: int = 192
+    tried: int = 1024
     radii: tuple[float, float] = (0.16, 0.04)
     sigmas: tuple[float, float, float] = (0.05, 0.02, 0.006)
     blurred: float = 0.012
@@ -75,7 +75,6 @@ class PointsNetwork(nn.Module):
         self.rotary = Rotary(width // config.heads)
         self.coarse, self.fine = Grouped(width, 0.02), Grouped(width, 0.01)
         self.told = Told(width)
-        self.asked = nn.Parameter(torch.randn(width) * 0.3)
         self.ghost = nn.Parameter(torch.randn(width) * 0.3)
         self.scene = nn.ModuleList(Block(width, config.heads) for _ in range(config.layers))
         self.asking = nn.ModuleList(Block(width, config.heads) for _ in range(config.asking))
@@ -127,8 +126,7 @@ class PointsNetwork(nn.Module):
         (at, colors), fine = (_groups(inputs, size) for size in c.groups)
         middle = at.mean(2)
         told = self.told(inputs, torch.zeros(len(at), 3))
-        asked = self.asked.expand(len(at), 1, -1)
-        tokens = torch.cat([asked, told, self.coarse(at, colors)], 1)
+        tokens = torch.cat([told, self.coarse(at, colors)], 1)
         places = F.pad(middle, (0, 0, tokens.shape[1] - middle.shape[1], 0))
         turns = self.rotary(places)
         for block in self.scene:
@@ -164,7 +162,7 @@ class PointsNetwork(nn.Module):
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """Tokens of a scene: the query (B, width), what was told, coarse ones and their places, fine groups."""
+    """Tokens of a scene: the gripper's (B, width), all that was told, coarse ones and their places, fine groups."""
 
     query: Tensor
     told: Tensor

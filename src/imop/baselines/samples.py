@@ -5,6 +5,7 @@ Clouds are made once per episode of a store and kept in a small file, so that tr
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -46,7 +47,6 @@ class Samples:
     Attributes:
         points: (N, POINTS, 3) the cloud without the robot; 0 .. 65535 across the workspace.
         colors: (N, POINTS, 3) 0 .. 255.
-        words: (N, LENGTH) of the instruction, see `numbers_of`.
         gripper: (N, 4, 4) where the gripper is.
         opening: (N,) 0 closed .. 1 open.
         step: (N,) keyframes reached before.
@@ -59,7 +59,6 @@ class Samples:
 
     points: UnsignedArray
     colors: ByteArray
-    words: NDArray[np.int64]
     gripper: Float32Array
     opening: Float32Array
     step: NDArray[np.int64]
@@ -71,6 +70,11 @@ class Samples:
 
     def __len__(self) -> int:
         return len(self.points)
+
+    @cached_property
+    def words(self) -> NDArray[np.int64]:
+        """(demonstrations, LENGTH) numbers of the words of each instruction."""
+        return np.stack([numbers_of(instruction) for instruction in self.instructions])
 
     def of(self, episodes: Sequence[int] | NDArray[np.int64]) -> NDArray[np.int64]:
         """Numbers of the samples of these demonstrations."""
@@ -116,7 +120,7 @@ def centered(T: FloatArray) -> Float32Array:
 
 
 def seen(perception: Perception, observation: Observation) -> dict[str, Any]:
-    """What a regressor knows of one state, by the names of `Samples` but for words and episode.
+    """What a regressor sees of one state, by the names of `Samples`.
 
     Raises:
         InvalidInput: if nothing is seen in the workspace.
@@ -142,7 +146,6 @@ def samples_of(perception: Perception, demonstration: Demonstration) -> Samples:
     rows = [
         {
             **seen(perception, keyframe.observation),
-            "words": numbers_of(demonstration.instructions[0]),
             "pose": centered(keyframe.action.T_world_gripper),
             "gripper_open": np.bool_(keyframe.action.gripper_open),
             "allow_collisions": np.bool_(keyframe.action.allow_collisions),
@@ -208,7 +211,7 @@ def _load(file: Path) -> Samples:
     remedy = "remove it, it is made again"
     try:
         with np.load(BytesIO(read(file, remedy))) as arrays:
-            known = {name: arrays[name] for name in arrays.files}
+            known = {field.name: arrays[field.name] for field in fields(Samples)}
         return Samples(**{**known, "instructions": tuple(known["instructions"].tolist())})
     except (ValueError, KeyError, TypeError, OSError) as error:
         raise CorruptData(file, f"holds no samples ({error})", remedy) from error

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 BUCKETS = 4096
-LENGTH = 24
+LENGTH = 31
 """Words of an instruction that are read; longer ones are cut."""
 
 
