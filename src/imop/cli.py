@@ -76,8 +76,8 @@ def run(
         shown: that of the demonstrated objects, if it shall show others of their kind.
         demo: store or folder of RLBench's layout with a demonstration; one is recorded if not given.
         demo_episode: which of its episodes.
-        method: learned, routed, replay, registration, textbook, oracle (true object poses), or one's own,
-            such as my_methods:MyPolicy.
+        method: learned, routed, paper, replay, registration, textbook, oracle (true object poses), or one's
+            own, such as my_methods:MyPolicy.
         change: what the scene differs in from the demonstrated one, as in `imop eval`.
         weights: folder that `imop train` wrote; by default the bundled weights.
         min_confidence: stop instead of acting below this confidence, 0 to 1.
@@ -182,8 +182,9 @@ def evaluate(
         split: base, novel, cross_object or all.
         tasks: names within the split; all if none is given.
         methods: any of replay, textbook (FPFH, RANSAC and ICP of Open3D, extra baselines), registration,
-            learned, routed (learned, and the routing network may go back to a step), oracle (true object
-            poses), expert, or one's own (my_methods:MyPolicy), joined by commas.
+            learned, routed (learned, and the routing network may go back to a step), paper (the paper's
+            networks and one fit, no search), oracle (true object poses), expert, or one's own
+            (my_methods:MyPolicy), joined by commas.
         episodes: scenes per task, spread over its variations.
         seed: first seed of the scenes.
         instance: seed of the demonstrated objects' shapes, sizes and colours.

@@ -15,10 +15,11 @@ from imop.geometry.perception import Perception
 from imop.networks.model import BUNDLED
 from imop.policy.interfaces import Matcher
 from imop.policy.one_shot import OneShotPolicy
+from imop.policy.paper import paper_policy
 from imop.policy.registration import RegistrationMatcher
 from imop.types import Action, Demonstration, Observation
 
-METHODS = ("replay", "textbook", "registration", "learned", "routed", "oracle", "expert")
+METHODS = ("replay", "textbook", "registration", "learned", "routed", "paper", "oracle", "expert")
 _OWN = (
     "a class or function that makes, called without arguments, an object with watch, reset and act, named "
     "module:object or by an entry point imop.methods"
@@ -48,9 +49,10 @@ def make_policy(
     """A fresh policy by the name of its method.
 
     Args:
-        method: learned, routed (learned, and the routing network chooses the step), replay, registration,
-            textbook, oracle, or one's own: "module:object", or an entry point of the group imop.methods. The
-            object makes a `Policy` when it is called without arguments.
+        method: learned, routed (learned, and the routing network chooses the step), paper (the networks and
+            one fit, without search and verification), replay, registration, textbook, oracle, or one's own:
+            "module:object", or an entry point of the group imop.methods. The object makes a `Policy` when it
+            is called without arguments.
         world: the simulated world, which only the oracle reads.
         min_confidence: of the one-shot policies.
         weights: folder of the networks' weights; by default the bundled ones. Registration asks the
@@ -75,6 +77,8 @@ def make_policy(
         return OneShotPolicy.from_pretrained(
             weights or BUNDLED, perception, min_confidence, method == "routed", reachable
         )
+    if method == "paper":
+        return paper_policy(weights or BUNDLED, perception, min_confidence, reachable)
     if method == "oracle" and world is not None:
         return OraclePolicy(world)
     policy = find_method(method)()

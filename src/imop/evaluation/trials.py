@@ -183,4 +183,4 @@ def change_notes(trials: Mapping[str, Sequence[Trial]], change: str) -> list[str
 
 def most_actions(method: str, demonstration: Demonstration, task: Task) -> int:
     """As many as were demonstrated, or as the task allows to a method that can go back to a step."""
-    return task.step_limit if method == "routed" else len(demonstration)
+    return task.step_limit if method in ("routed", "paper") else len(demonstration)

@@ -130,7 +130,7 @@ def find_shown_regions(model: Model, steps: Sequence[Transition], config: Policy
     objects = [find_objects(step.before.cloud, step.before.ground.plane) for step in steps]
     contacts = find_contacts(steps, objects)
     instead = [find_region(steps, k, objects[k], contacts, config).cloud for k in range(len(steps))]
-    batches = _batches(model.config.graph, steps)
+    batches = step_batches(model.config.graph, steps)
     return [
         _find(model, batches[k], steps, k, contacts, config, instead[k].points) for k in range(len(steps))
     ]
@@ -177,7 +177,7 @@ def _away(step: Transition, p_gripper_held: FloatArray, points: FloatArray) -> f
     return float(nearest(p_goal, points)[0].min())
 
 
-def _batches(shape: GraphConfig, steps: Sequence[Transition]) -> list[StepBatch]:
+def step_batches(shape: GraphConfig, steps: Sequence[Transition]) -> list[StepBatch]:
     """The steps of one demonstration, each alone, as the networks see them."""
     scenes = {id(scene): scene for step in steps for scene in (step.before, step.after)}
     graphs = {key: build_graph(scene.cloud, shape, scene.ground) for key, scene in scenes.items()}

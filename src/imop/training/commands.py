@@ -46,6 +46,11 @@ class Stage:
         return out / "stages" / f"{self.name}.log"
 
 
+def quoted(path: Path) -> str:
+    """A path as it is typed in a command."""
+    return shlex.quote(str(path))
+
+
 def run(every: Sequence[Stage], out: Path, console: Console) -> None:
     """Run the stages that are not done, one after the other.
 

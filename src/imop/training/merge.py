@@ -22,24 +22,27 @@ class MergeConfig:
 
     Attributes:
         out: folder for the whole model.
-        pairs: folder with the weights of the region, matching and verification networks.
+        pairs: folder with the weights of the region, matching and pose networks.
         routing: folder with the weights of the routing network; None leaves it untrained.
+        verification: folder with those of the verification network; None takes those beside the pairs'.
     """
 
     out: Path
     pairs: Path
     routing: Path | None = None
+    verification: Path | None = None
 
 
 def merge(config: MergeConfig) -> Model:
-    """The model of both folders, written to `config.out`; its card holds both cards.
+    """The model of all folders, written to `config.out`; its card holds their cards.
 
     Each folder gives only its own networks, so the others in it may have any shape.
 
     Raises:
         CorruptData: if a file cannot be read or does not fit its configuration.
     """
-    taken = dict.fromkeys(("region", "matching", "verification", "graph"), config.pairs)
+    taken = dict.fromkeys(("region", "matching", "pose", "graph"), config.pairs)
+    taken["verification"] = config.verification or config.pairs
     if config.routing is not None:
         taken |= {"routing": config.routing, "route_graph": config.routing}
     cards = {folder: _card(folder) for folder in dict.fromkeys(taken.values())}
@@ -48,8 +51,9 @@ def merge(config: MergeConfig) -> Model:
         known = {name: part for name, part in parts.items() if part is not None}
         model = Model(dacite.from_dict(ModelConfig, known, dacite.Config(cast=[tuple], strict=True)))
         for name in taken.keys() & NETWORKS:
-            weights = load_file(taken[name] / WEIGHTS)
-            getattr(model, name).load_state_dict(part_of(weights, name))
+            network = getattr(model, name)
+            if network is not None:  # least squares have no weights
+                network.load_state_dict(part_of(load_file(taken[name] / WEIGHTS), name))
     except (KeyError, dacite.DaciteError, SafetensorError, RuntimeError, TypeError, OSError) as error:
         raise CorruptData(config.pairs, f"weights and configuration do not fit ({error})") from error
     rest = {
