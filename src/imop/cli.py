@@ -169,6 +169,7 @@ def evaluate(
     change: Annotated[str, tyro.conf.arg(metavar="FACTOR,FACTOR")] = "",
     jobs: int = 2,
     weights: Path | None = None,
+    baselines: Path | None = None,
     out: Path = Path("runs/eval"),
 ) -> int:
     """Success rates of several methods on the same demonstrations and scenes.
@@ -194,6 +195,8 @@ def evaluate(
             sensors d415, calibration, knocked, fewer_cameras. docs/tasks.md says what they are.
         jobs: parallel processes.
         weights: folder that `imop train` wrote, for the learned policy; by default the bundled weights.
+        baselines: folder of the weights of act3d, rvt, rvt_ft and rvt_hdt (docs/baselines.md); by default
+            runs/baselines.
         out: folder for the results.
     """
     from imop.evaluation.benchmark import evaluate_suite
@@ -214,6 +217,7 @@ def evaluate(
         weights,
         change,
         instances,
+        baselines,
     )
     results.save(out)
     console.print(results.table())

@@ -101,4 +101,6 @@ def _metres(points: UnsignedArray) -> Float32Array:
 
 
 def _tensors(kind: Any, rows: dict[str, Any]) -> Any:
-    return kind(**{field.name: torch.from_numpy(np.ascontiguousarray(rows[field.name])) for field in fields(kind)})
+    return kind(
+        **{field.name: torch.from_numpy(np.ascontiguousarray(rows[field.name])) for field in fields(kind)}
+    )

@@ -13,6 +13,7 @@ import sys
 import time
 from collections import defaultdict
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,6 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from imop.baselines.batch import Targets, batch_of
-from imop.baselines.measure import measure
 from imop.baselines.samples import Samples
 from imop.baselines.train import descend, read_stores, schedule
 from imop.baselines.views import ViewsNetwork
@@ -49,7 +49,9 @@ class HyperNetwork(nn.Module):
 
     def __init__(self, described: int, blocks: int, size: int, width: int = 64):
         super().__init__()
-        self.keyframe = nn.Sequential(nn.Linear(described + _ACTION, 2 * width), nn.GELU(), nn.Linear(2 * width, width))
+        self.keyframe = nn.Sequential(
+            nn.Linear(described + _ACTION, 2 * width), nn.GELU(), nn.Linear(2 * width, width)
+        )
         self.block = nn.Parameter(torch.randn(blocks, width) * 0.3)
         self.task = nn.Linear(width, width)
         self.down, self.up = nn.Linear(width, size // 2), nn.Linear(width, size // 2)
@@ -132,13 +134,14 @@ def train_hyper(
     optimizer = torch.optim.AdamW(hyper.parameters(), lr=config.learning_rate, weight_decay=0.01)
     step, seconds = _resume(config.out / CHECKPOINT, hyper, optimizer)
     pairs = _Pairs(samples, config.held_back)
+    shown = cache(lambda episode: described(network, samples, samples.of([episode])))
     started, last = time.monotonic() - seconds, min(config.steps, stop_at or config.steps)
     while step < last:
         rng = np.random.default_rng((config.seed, step))
         torch.manual_seed(int(rng.integers(2**31)))
-        numbers, shown = pairs.draw(config.batch, rng)
+        numbers, episodes = pairs.draw(config.batch, rng)
         inputs, targets = batch_of(samples, numbers, rng)
-        keyframes = [described(network, samples, samples.of([episode])) for episode in shown]
+        keyframes = [shown(episode) for episode in episodes]
         for group in optimizer.param_groups:
             group["lr"] = config.learning_rate * schedule(step, config.warm_up, config.steps)
         with fast_products():

@@ -131,7 +131,9 @@ class PointsNetwork(nn.Module):
         turns = self.rotary(places)
         for block in self.scene:
             tokens = block(tokens, turns=(turns, turns))
-        return _Scene(tokens[:, 0], tokens[:, : -middle.shape[1]], tokens[:, -middle.shape[1] :], middle, *fine)
+        return _Scene(
+            tokens[:, 0], tokens[:, : -middle.shape[1]], tokens[:, -middle.shape[1] :], middle, *fine
+        )
 
     def _ask(self, scene: "_Scene", ghosts: Tensor, stage: int, around: Tensor) -> Tensor:
         """(B, G, width) features of ghost points (B, G, 3); after the first stage of what lies `around`."""

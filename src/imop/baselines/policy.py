@@ -25,9 +25,11 @@ from imop.geometry import se3
 from imop.geometry.perception import Perception
 from imop.types import Action, Demonstration, Observation
 
-REGRESSORS = ("act3d", "rvt", "rvt_ft", "rvt_hdt")
+PARTS = {"act3d": ("points",), "rvt": ("views",), "rvt_ft": ("views",), "rvt_hdt": ("views", "views_hdt")}
+"""Folders of weights that each method needs."""
+REGRESSORS = tuple(PARTS)
 FOLDER = Path("runs/baselines")
-"""Where the weights are looked for: points/ of act3d, views/ of the others, views_hdt/ of rvt_hdt."""
+"""Where these folders are looked for."""
 
 
 class RegressorPolicy:
@@ -83,7 +85,7 @@ class RegressorPolicy:
 def _action(found: Targets) -> Action:
     T = found.pose[0].double().numpy()
     return Action(
-        se3.orthonormal(T) @ se3.make(p=T[:3, :3].T @ CENTER),
+        se3.make(p=CENTER) @ se3.orthonormal(T),
         bool(found.gripper_open[0] > 0.5),
         bool(found.allow_collisions[0] > 0.5),
     )

@@ -232,7 +232,7 @@ def card_of(config: RegressorConfig, samples: Samples, learnt: int) -> dict[str,
 
 def _write(state: TrainState, config: RegressorConfig, card: dict[str, Any]) -> None:
     with (config.out / LOG).open("a") as log:
-        reached = {name: card[name] for name in ("step", "seconds", "losses", "validation")}
+        reached = {name: card[name] for name in ("step", "seconds", "samples_learnt", "losses", "validation")}
         log.write(json.dumps(reached) + "\n")
     state.save(config.out / CHECKPOINT)
     save_network(state.average, config.out, card)

@@ -174,9 +174,7 @@ class ViewsNetwork(nn.Module):
         """How many adapters there can be, and how many numbers each has."""
         return 2 * (self.config.apart + self.config.together), adapter_size(self.config.width)
 
-    def loss(
-        self, inputs: Inputs, targets: Targets, adapters: Tensor | None = None
-    ) -> dict[str, Tensor]:
+    def loss(self, inputs: Inputs, targets: Targets, adapters: Tensor | None = None) -> dict[str, Tensor]:
         """Cross-entropies of heat maps, angles, gripper and collisions; adapters as in `predict`."""
         c, p = self.config, targets.pose[:, :3, 3]
         first, second = self._split(adapters)
@@ -206,7 +204,9 @@ class ViewsNetwork(nn.Module):
         heat, _, _ = self._look(self.far, inputs, torch.zeros(len(inputs.points), 3), 1.0, first)
         origin = place_of(heat, 1.0)
         near, features, tokens = self._look(self.near, inputs, origin, self.config.zoom, second)
-        angles, opened, collides = self._act(near.float().flatten(2).softmax(-1).view_as(near), features, tokens)
+        angles, opened, collides = self._act(
+            near.float().flatten(2).softmax(-1).view_as(near), features, tokens
+        )
         pose = torch.eye(4).repeat(len(origin), 1, 1)
         pose[:, :3, :3] = rotations_of(likeliest(angles.float()))
         pose[:, :3, 3] = origin + place_of(near, self.config.zoom)

@@ -115,5 +115,8 @@ def load_network(folder: Path, kind: str) -> tuple[Regressor, dict[str, Any]]:
 
 def fast_products() -> torch.autocast:
     """Products in bfloat16 where the processor has fast instructions for it; sums stay in float32."""
-    fast = "AVX512" in torch.backends.cpu.get_cpu_capability() or "AMX" in torch.backends.cpu.get_cpu_capability()
+    fast = (
+        "AVX512" in torch.backends.cpu.get_cpu_capability()
+        or "AMX" in torch.backends.cpu.get_cpu_capability()
+    )
     return torch.autocast("cpu", torch.bfloat16, enabled=fast)

@@ -7,6 +7,7 @@ from pathlib import Path
 from joblib import delayed
 from rich.console import Console
 
+from imop.baselines.policy import REGRESSORS
 from imop.errors import AssetMissing, ImopError, InvalidInput, MissingExtra
 from imop.evaluation.episodes import Episode, EpisodeLog, method_state
 from imop.evaluation.jobs import parallel
@@ -23,6 +24,8 @@ from imop.types import Demonstration
 NOTES = (
     "One demonstration per task and variation, from a scene that is never tested.",
     "The networks of learned saw synthetic pairs and base tasks with other objects; others saw nothing.",
+    "act3d and rvt are regressors in the manner of these, trained on demonstrations of base tasks; rvt_ft and "
+    "rvt_hdt are fine-tuned on the demonstration of a novel task. They are told its instruction.",
     "replay, registration and learned see four 128 x 128 RGB-D views, camera poses, joint positions and "
     "the gripper; no segmentation, names or object poses.",
     "oracle carries the demonstrated poses over by the true object pose; expert reads everything.",
@@ -51,6 +54,7 @@ def evaluate_suite(
     weights: Path | None = None,
     change: str = "",
     instances: Instances = "same",
+    baselines: Path | None = None,
 ) -> Results:
     """Try every method in the same `episodes` scenes of every task.
 
@@ -68,6 +72,7 @@ def evaluate_suite(
         weights: of the learned policy; None for the bundled ones.
         change: what the scenes differ in, names of `tasks.changes.FACTORS` joined by commas.
         instances: whether the scenes show the demonstrated objects or others of their kind.
+        baselines: folder of the regressors' weights; None for the default one.
 
     Raises:
         InvalidInput: for an unknown suite, split, task, method or change, or other instances where there are
@@ -76,7 +81,7 @@ def evaluate_suite(
     """
     trials = suite_trials(suite, split, tasks, episodes, seed, instance, change, instances == "other")
     everything = [trial for of_task in trials.values() for trial in of_task]
-    found = tried(everything, methods, jobs, console, log, weights)
+    found = tried(everything, methods, jobs, console, log, weights, baselines=baselines)
     counts = {
         method: {task: count_of([found[trial, method] for trial in trials[task]]) for task in trials}
         for method in methods
@@ -94,6 +99,7 @@ def tried(
     log: Path,
     weights: Path | None = None,
     focus: bool = False,
+    baselines: Path | None = None,
 ) -> dict[tuple[Trial, str], Episode]:
     """The episode of every method in every scene: from the log, or tried now and added to it.
 
@@ -105,18 +111,24 @@ def tried(
         CorruptData: if the log cannot be read.
         ExpertFailed, NoRoom: if there is no demonstration for a scene.
     """
+    folders = {method: baselines if method in REGRESSORS else weights for method in methods}
     for method in methods:
         if method not in ("oracle", "expert"):
-            policy = make_policy(method, weights=weights)  # what is missing is said before anything is tried
+            policy = make_policy(
+                method, weights=folders[method]
+            )  # what is missing is said before anything is tried
         if focus and (method in ("oracle", "expert") or not isinstance(policy, OneShotPolicy)):
             raise InvalidInput("focus", f"{method} takes none", "learned, routed, registration, textbook")
     known = EpisodeLog(log)
-    state = cache(lambda task, method: method_state(method, weights, task) + ("-focus" if focus else ""))
+    state = cache(
+        lambda task, method: method_state(method, folders[method], task) + ("-focus" if focus else "")
+    )
     wanted = [(trial, method, state(trial.task, method)) for trial in trials for method in methods]
     missing = [one for one in wanted if known.find(*one) is None]
     shown = _demonstrations([trial for trial, _, _ in missing], jobs, console)
     work = [
-        delayed(attempt)(one[0], shown[shown_together(one[0])], *one[1:], weights, focus) for one in missing
+        delayed(attempt)(one[0], shown[shown_together(one[0])], *one[1:], folders[one[1]], focus)
+        for one in missing
     ]
     for episode in parallel(work, jobs, console, "episodes"):
         known.add(episode)

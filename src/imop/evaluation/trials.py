@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from imop.baselines.policy import REGRESSORS
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.splits import chosen_tasks
 from imop.sim.sensing import Sensing
@@ -182,5 +183,5 @@ def change_notes(trials: Mapping[str, Sequence[Trial]], change: str) -> list[str
 
 
 def most_actions(method: str, demonstration: Demonstration, task: Task) -> int:
-    """As many as were demonstrated, or as the task allows to a method that can go back to a step."""
-    return task.step_limit if method in ("routed", "paper") else len(demonstration)
+    """As many as were demonstrated, or as the task allows to a method that can go back, or goes by what it sees."""
+    return task.step_limit if method in ("routed", "paper", *REGRESSORS) else len(demonstration)
