@@ -1,9 +1,9 @@
 import numpy as np
 import torch
-from tests.baselines.conftest import some_samples
 
 from imop.baselines.batch import SHIFT, TURN, batch_of, random_motion
 from imop.geometry import se3
+from tests.baselines.conftest import some_samples
 
 
 def test_cloud_gripper_and_target_move_together():

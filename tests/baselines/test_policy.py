@@ -3,8 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.baselines.conftest import TINY, some_samples
-from tests.demos.scenes import lift_a_cube
 
 from imop.baselines import policy
 from imop.baselines.adapt import AdaptConfig, fine_tuned, tuned_adapters
@@ -15,6 +13,8 @@ from imop.baselines.train import RegressorConfig, train
 from imop.baselines.weights import load_network, make_network
 from imop.errors import AssetMissing, CorruptData, InvalidInput
 from imop.geometry.perception import Perception
+from tests.baselines.conftest import TINY, some_samples
+from tests.demos.scenes import lift_a_cube
 
 FEW = AdaptConfig(steps=2, batch=2)
 

@@ -2,13 +2,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.baselines.conftest import some_samples
 
 from imop.baselines.samples import CENTER, POINTS, joined, samples_of, stored_samples, thin
 from imop.demos.store import DemonstrationStore
 from imop.errors import CorruptData, InvalidInput
 from imop.geometry.cloud import PointCloud
 from imop.geometry.perception import Perception
+from tests.baselines.conftest import some_samples
 from tests.demos.scenes import lift_a_cube
 
 PLAIN = Perception()

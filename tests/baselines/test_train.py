@@ -3,12 +3,12 @@ import json
 import numpy as np
 import pytest
 import torch
-from tests.baselines.conftest import TINY, some_samples
 
 from imop.baselines.measure import measure
 from imop.baselines.train import RegressorConfig, train
 from imop.baselines.weights import load_network
 from imop.errors import AssetMissing, CorruptData, InvalidInput
+from tests.baselines.conftest import TINY, some_samples
 
 
 def config(kind, out, **changed):

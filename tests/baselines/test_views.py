@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 import torch
-from tests.baselines.conftest import TINY, some_samples
 
 from imop.baselines.batch import batch_of
 from imop.baselines.views import draw, heat_of, place_of
 from imop.baselines.weights import make_network
+from tests.baselines.conftest import TINY, some_samples
 
 
 @pytest.mark.parametrize("size", [1.0, 0.3])

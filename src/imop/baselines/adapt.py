@@ -1,9 +1,9 @@
 """Fine-tuning on one demonstration of a novel task, of all weights (RVT+FT) or of adapters alone (RVT+HDT).
 
-python -m imop.baselines.adapt --weights runs/baselines/views --stores novel.zarr --out runs/baselines/views_ft
+python -m imop.baselines.adapt --weights runs/baselines/views --stores novel.zarr --out runs/tuned/views
 
-fine-tunes all weights on the demonstrations of stores together, as the paper does it, to see what that does to
-the base tasks: the folder can stand where the weights of the plain method stand.
+fine-tunes all weights on the demonstrations of stores together, as the paper does it, to see what that does
+to the base tasks: `imop eval --methods rvt --baselines runs/tuned` asks the new weights.
 """
 
 import shlex
@@ -111,7 +111,7 @@ class Fold:
         stores: with the demonstrations, one of each novel task and variation.
         out: folder for the new weights.
         cache: folder in which every store gets one for its clouds.
-        steps: of the optimizer; as many as the training of one demonstration takes, for each of them, if None.
+        steps: of the optimizer; if None, for each demonstration as many as one alone takes.
         batch: samples of a step.
         learning_rate: at its peak.
     """

@@ -1,10 +1,11 @@
-"""A hyper-network that makes adapters from a demonstration, after Hyper-Decision Transformer (Xu et al. 2023).
+"""A hyper-network that makes adapters from a demonstration, after Hyper-Decision Transformer.
 
-The network in the manner of RVT stays frozen. From what it sees at the keyframes of the demonstration and from
-the actions there, the hyper-network makes the weights of a bottleneck behind every block. It is trained on
-base tasks: adapters from one demonstration shall help in other demonstrations of the same task.
+The network in the manner of RVT stays frozen. From what it sees at the keyframes of the demonstration and
+from the actions there, the hyper-network makes the weights of a bottleneck behind every block (Xu et al.
+2023, arXiv 2304.08487). It is trained on base tasks: adapters from one demonstration shall help in others of
+the same task.
 
-python -m imop.baselines.hyper --weights runs/baselines/views --stores rlbench.zarr --out runs/baselines/views_hdt
+python -m imop.baselines.hyper --weights runs/baselines/views --stores A.zarr --out runs/baselines/views_hdt
 """
 
 import json
@@ -218,7 +219,8 @@ def load_hyper_network(folder: Path, network: ViewsNetwork, backbone: str) -> Hy
         AssetMissing: if there is none; it names the command that trains one.
         CorruptData: if it is damaged, or was trained for other weights.
     """
-    command = f"python -m imop.baselines.hyper --weights {folder.parent / 'views'} --stores STORE ... --out {folder}"
+    views = folder.parent / "views"
+    command = f"python -m imop.baselines.hyper --weights {views} --stores STORE ... --out {folder}"
     weights, card = read_weights(folder, command)
     if card.get("backbone") != backbone:
         raise CorruptData(folder, "was trained for other weights of the network", f"train again: {command}")

@@ -22,9 +22,9 @@ def measure(
     """Errors of at most `most` samples of these numbers, evenly spread, as they were recorded.
 
     Returns:
-        Medians of the errors of place (metres) and rotation (degrees); shares of places within 1 and 2 cm and of
-        what is within 2 cm and 10 degrees; shares of right gripper states and of right collisions. Nothing if
-        there are no samples.
+        Medians of the errors of place (metres) and rotation (degrees); shares of places within 1 and 2 cm and
+        of what is within 2 cm and 10 degrees; shares of right gripper states and of right collisions. Nothing
+        if there are no samples.
     """
     chosen = numbers[np.linspace(0, len(numbers) - 1, min(most, len(numbers))).astype(int)]
     if not len(chosen):

@@ -1,9 +1,9 @@
 """A regressor in the manner of Act3D (Gervet et al. 2023, arXiv 2306.17817).
 
 Ghost points are sampled in space, all over the workspace first, then twice more around the best one. Each
-attends to features of the scene, by relative positions (rotary), and is scored against the token of the gripper,
-which has attended to the words and the scene. The best of the last is the place; rotation, gripper and collisions follow from its
-feature.
+attends to features of the scene, by relative positions (rotary), and is scored against the token of the
+gripper, which has attended to the words and the scene. The best of the last is the place; rotation, gripper
+and collisions follow from its feature.
 
 What differs: features of the scene come from groups of points of the cloud instead of pretrained images'.
 """
@@ -164,7 +164,14 @@ class PointsNetwork(nn.Module):
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """Tokens of a scene: the gripper's (B, width), all that was told, coarse ones and their places, fine groups."""
+    """Tokens of a scene.
+
+    Attributes:
+        query: (B, width) the gripper's.
+        told: (B, T, width) the gripper's and those of the words.
+        coarse, middle: (B, G, width) and their places (B, G, 3).
+        points, colors: (B, F, K, 3) the fine groups, which become tokens when they are asked.
+    """
 
     query: Tensor
     told: Tensor

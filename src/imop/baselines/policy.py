@@ -1,4 +1,4 @@
-"""The regressors as policies: the words of the demonstration say what to do; novel tasks may be fine-tuned."""
+"""The regressors as policies: the words of the demonstration say what to do; novel tasks may be learnt."""
 
 import hashlib
 from collections.abc import Callable
@@ -52,7 +52,7 @@ class RegressorPolicy:
         self._instruction: str | None = None
 
     def watch(self, demonstration: Demonstration) -> None:
-        """Take the instruction, and fit the network if that is wanted; of several demonstrations the last counts.
+        """Take the instruction, and fit the network if that is wanted; the last demonstration counts.
 
         Raises:
             InvalidInput: if the demonstration has no instruction, or it is to be learnt and nothing is seen.

@@ -1,4 +1,4 @@
-"""What the regressors are trained on: a thin cloud and the state of the gripper at a keyframe, and its action.
+"""What the regressors are trained on: a thin cloud and the gripper at a keyframe, and the action there.
 
 Clouds are made once per episode of a store and kept in a small file, so that training decodes no images.
 """
@@ -32,7 +32,7 @@ from imop.types import BoolArray, ByteArray, Demonstration, Float32Array, FloatA
 POINTS = 4096
 """Points of a thin cloud."""
 CENTER = (np.array(WORKSPACE_LOWER) + np.array(WORKSPACE_UPPER)) / 2
-"""(3,) the middle of the workspace, a cube with an edge of 1 m; all samples are in a frame with this origin."""
+"""(3,) the middle of the workspace, a cube with an edge of 1 m; samples are in a frame with this origin."""
 _GROUND_VOXEL = 0.035
 _STEPS = 2**16 - 1
 _BITS = 10

@@ -1,9 +1,9 @@
 """A regressor in the manner of RVT (Goyal et al. 2023, arXiv 2306.14896).
 
-The cloud is drawn anew from virtual views, top, front and side, without perspective. Patches of all views, the
-words and the gripper attend to each other. Every view gets a heat map; the place is where the sum of the heat
-maps over a grid of points, projected into the views, is greatest. Rotation (a class per Euler angle), gripper
-and collisions follow from features there.
+The cloud is drawn anew from virtual views, top, front and side, without perspective. Patches of all views,
+the words and the gripper attend to each other. Every view gets a heat map; the place is where the sum of the
+heat maps over a grid of points, projected into the views, is greatest. Rotation (a class per Euler angle),
+gripper and collisions follow from features there.
 
 What differs: each view holds what is seen from both of its sides, so that three stand for six; and a second
 look at what lies around the place, by another network of the same kind, makes up for coarse pixels (as RVT-2
@@ -95,7 +95,7 @@ def heat_of(place: Tensor, size: float, pixels: int, sigma: float) -> Tensor:
 
 
 def place_of(heat: Tensor, size: float) -> Tensor:
-    """(B, 3) where the sum of the logarithmic heat maps (B, 3, pixels, pixels) is greatest, finer than pixels.
+    """(B, 3) where the sum of logarithmic heat maps (B, 3, pixels, pixels) is greatest, finer than pixels.
 
     The points that are asked are the middles of the pixels' cubes; the mean of the best one's neighbours
     counts, each weighed by its heat.

@@ -45,7 +45,7 @@ def make_network(kind: str, config: Mapping[str, Any] | None = None) -> Regresso
 
 
 def kind_of(network: Regressor) -> str:
-    """points or views."""
+    """Points or views."""
     return "views" if isinstance(network, ViewsNetwork) else "points"
 
 

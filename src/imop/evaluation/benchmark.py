@@ -24,8 +24,8 @@ from imop.types import Demonstration
 NOTES = (
     "One demonstration per task and variation, from a scene that is never tested.",
     "The networks of learned saw synthetic pairs and base tasks with other objects; others saw nothing.",
-    "act3d and rvt are regressors in the manner of these, trained on demonstrations of base tasks; rvt_ft and "
-    "rvt_hdt are fine-tuned on the demonstration of a novel task. They are told its instruction.",
+    "act3d and rvt are regressors in the manner of these, trained on demonstrations of base tasks; rvt_ft "
+    "and rvt_hdt are fine-tuned on the demonstration of a novel task. They are told its instruction.",
     "replay, registration and learned see four 128 x 128 RGB-D views, camera poses, joint positions and "
     "the gripper; no segmentation, names or object poses.",
     "oracle carries the demonstrated poses over by the true object pose; expert reads everything.",

@@ -183,5 +183,5 @@ def change_notes(trials: Mapping[str, Sequence[Trial]], change: str) -> list[str
 
 
 def most_actions(method: str, demonstration: Demonstration, task: Task) -> int:
-    """As many as were demonstrated, or as the task allows to a method that can go back, or goes by what it sees."""
+    """As many as were demonstrated, or as the task allows to a method that does not follow their order."""
     return task.step_limit if method in ("routed", "paper", *REGRESSORS) else len(demonstration)
