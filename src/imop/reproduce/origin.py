@@ -11,6 +11,7 @@ from pathlib import Path
 from safetensors import safe_open
 
 import imop
+from imop.baselines.policy import PARTS
 from imop.evaluation.fingerprint import code_digest
 from imop.networks.model import BUNDLED, WEIGHTS
 
@@ -49,9 +50,15 @@ def parameters(method: str, weights: str) -> int | None:
     Returns:
         None for a method that has other networks or none, or if the file is not there.
     """
-    file = (Path(weights) if weights else BUNDLED) / WEIGHTS
-    if method not in _TRAINED or not file.is_file():
+    folder = Path(weights) if weights else BUNDLED
+    parts = PARTS.get(method, ("",) if method in _TRAINED else ())
+    files = [folder / part / WEIGHTS for part in parts]
+    if not files or not all(file.is_file() for file in files):
         return None
+    return sum(_numbers(file) for file in files)
+
+
+def _numbers(file: Path) -> int:
     with safe_open(file, "pt") as tensors:
         shapes: list[list[int]] = [tensors.get_slice(name).get_shape() for name in tensors.keys()]  # noqa: SIM118
     return sum(math.prod(shape) for shape in shapes)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from imop.baselines.policy import REGRESSORS
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.benchmark import tried
 from imop.evaluation.episodes import Episode, EpisodeLog, method_state
@@ -168,7 +169,8 @@ def _tried(
     scenes = rows[0].tried_in(trials)
     everything = [trial for of_task in scenes.values() for trial in of_task]
     methods, log = [row.method for row in rows], options.out / LOG
-    found = tried(everything, methods, options.jobs, console, log, rows[0].weights, focus)
+    weights = rows[0].weights
+    found = tried(everything, methods, options.jobs, console, log, weights, focus, baselines=weights)
     return {
         row.label: {
             task: [_outcome(found[trial, row.method]) for trial in of_task]
@@ -198,7 +200,8 @@ def _outcome(episode: Episode) -> bool | None:
 @cache
 def why_not(row: Row) -> str:
     """Why a row cannot be tried, and what would help; empty if it can."""
-    if row.weights is not None and not (row.weights / WEIGHTS).is_file():
+    alone = row.method not in REGRESSORS  # the others have a folder each, in that of the row
+    if alone and row.weights is not None and not (row.weights / WEIGHTS).is_file():
         return f"no weights in {row.weights}; {row.made_by}"
     try:
         make_policy(row.method, weights=row.weights)
