@@ -37,7 +37,7 @@ def test_stopped_and_resumed_training_gives_the_same_weights(kind, tmp_path):
 
 def test_a_tiny_network_learns_one_sample(kind, tmp_path):
     samples = some_samples(1)
-    steps = config(kind, tmp_path, steps=150, batch=4, learning_rate=3e-3, every=150, ema=0.9)
+    steps = config(kind, tmp_path, steps=100, batch=2, learning_rate=3e-3, every=100, ema=0.9)
     losses = train(steps, samples, shape=TINY[kind])
     assert np.mean(losses[-10:]) < 0.75 * np.mean(losses[:10])
     found = measure(load_network(tmp_path, kind)[0], samples, np.arange(1), 1)
@@ -47,7 +47,7 @@ def test_a_tiny_network_learns_one_sample(kind, tmp_path):
 def test_held_back_demonstrations_are_not_learnt(tmp_path):
     train(config("views", tmp_path, held_back=2), some_samples(6, 4), shape=TINY["views"])
     _, card = load_network(tmp_path, "views")
-    assert card["samples"] == 6 and card["samples_learnt"] == 4 and card["demonstrations"] == 4
+    assert card["samples"] == 6 and card["samples_learnt"] == 3 and card["demonstrations"] == 4
     log = [json.loads(line) for line in (tmp_path / "log.jsonl").read_text().splitlines()]
     assert [line["step"] for line in log] == [3, 6] and set(log[-1]["validation"]) >= {"place", "rotation"}
 

@@ -83,7 +83,7 @@ def tuned_adapters(
     finally:
         for parameter in frozen:
             parameter.requires_grad_(True)
-    return trained[0].detach()
+    return torch.as_tensor(trained[0].detach())
 
 
 def _descend(

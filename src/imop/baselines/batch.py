@@ -57,7 +57,7 @@ def inputs_of(seen: dict[str, Any], words: NDArray[np.int64]) -> Inputs:
     rows = {name: np.asarray(value)[None] for name, value in seen.items()}
     points = _metres(rows.pop("points"))
     colors = rows.pop("colors").astype(np.float32) / 255
-    return _tensors(Inputs, {**rows, "points": points, "colors": colors, "words": words[None]})
+    return Inputs(**_tensors(Inputs, {**rows, "points": points, "colors": colors, "words": words[None]}))
 
 
 def batch_of(
@@ -78,7 +78,7 @@ def batch_of(
     rows["words"] = samples.words[samples.episode[numbers]]
     for name in ("gripper_open", "allow_collisions"):
         rows[name] = rows[name].astype(np.float32)
-    return _tensors(Inputs, rows), _tensors(Targets, rows)
+    return Inputs(**_tensors(Inputs, rows)), Targets(**_tensors(Targets, rows))
 
 
 def random_motion(pose: Float32Array, rng: np.random.Generator) -> Float32Array:
@@ -89,7 +89,7 @@ def random_motion(pose: Float32Array, rng: np.random.Generator) -> Float32Array:
         rng: draws up to `TURN` and `SHIFT`.
     """
     p = pose[:3, 3]
-    T = np.eye(4, dtype=np.float32)
+    T: Float32Array = np.eye(4, dtype=np.float32)
     T[:3, :3] = Rotation.from_euler("z", rng.uniform(-TURN, TURN)).as_matrix()
     lowest, highest = np.minimum(p, -0.5), np.maximum(p, 0.5)  # a target outside stays where it is
     T[:3, 3] = (p + rng.uniform(-SHIFT, SHIFT, 3)).clip(lowest, highest) - T[:3, :3] @ p
@@ -97,10 +97,8 @@ def random_motion(pose: Float32Array, rng: np.random.Generator) -> Float32Array:
 
 
 def _metres(points: UnsignedArray) -> Float32Array:
-    return points.astype(np.float32) / (2**16 - 1) - np.float32(0.5)
+    return np.asarray(points.astype(np.float32) / (2**16 - 1) - 0.5, dtype=np.float32)
 
 
-def _tensors(kind: Any, rows: dict[str, Any]) -> Any:
-    return kind(
-        **{field.name: torch.from_numpy(np.ascontiguousarray(rows[field.name])) for field in fields(kind)}
-    )
+def _tensors(kind: type[Inputs] | type[Targets], rows: dict[str, Any]) -> dict[str, Tensor]:
+    return {field.name: torch.from_numpy(np.ascontiguousarray(rows[field.name])) for field in fields(kind)}

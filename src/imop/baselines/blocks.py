@@ -48,10 +48,11 @@ class Block(nn.Module):
         shares = (q * q.shape[-1] ** -0.5 @ k.transpose(-1, -2)).softmax(-1)
         x = x + self.out((shares.to(v.dtype) @ v).transpose(1, 2).flatten(2))
         x = x + self.perceptron(self.norm_out(x))
-        return x if adapter is None else x + _bottleneck(x, adapter)
+        out: Tensor = x if adapter is None else x + _bottleneck(x, adapter)
+        return out
 
     def _split(self, x: Tensor) -> Tensor:
-        return x.unflatten(-1, (self.heads, -1)).transpose(1, 2)
+        return x.view(*x.shape[:2], self.heads, -1).transpose(1, 2)
 
 
 def adapter_size(width: int) -> int:
@@ -61,8 +62,9 @@ def adapter_size(width: int) -> int:
 
 def _bottleneck(x: Tensor, adapter: Tensor) -> Tensor:
     width = x.shape[-1]
-    down, up = adapter.unflatten(-1, (2, RANK, width)).unbind(1)
-    return F.gelu(F.layer_norm(x, (width,)) @ down.transpose(1, 2)) @ up
+    down, up = adapter.view(-1, 2, RANK, width).unbind(1)
+    bottleneck: Tensor = F.gelu(F.layer_norm(x, (width,)) @ down.transpose(1, 2)) @ up
+    return bottleneck
 
 
 class Rotary(nn.Module):

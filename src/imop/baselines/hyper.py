@@ -150,7 +150,7 @@ def train_hyper(
         descend(hyper, optimizer, parts, 5.0)
         step += 1
         if step % config.every == 0 or step == last:
-            reached = {"step": step, "seconds": round(time.monotonic() - started)}
+            reached: dict[str, Any] = {"step": step, "seconds": round(time.monotonic() - started)}
             reached |= {name: round(float(value), 4) for name, value in parts.items()}
             _save(config, hyper, optimizer, reached, card["sha256"], samples)
             if console is not None:

@@ -154,12 +154,13 @@ class PointsNetwork(nn.Module):
 
     def _scores(self, scene: "_Scene", features: Tensor, stage: int) -> Tensor:
         query = self.score[stage](scene.query)
-        return torch.einsum("bgc,bc->bg", features.float(), query.float()) / query.shape[-1] ** 0.5
+        products: Tensor = torch.einsum("bgc,bc->bg", features.float(), query.float())
+        return products / query.shape[-1] ** 0.5
 
     def _act(self, scene: "_Scene", feature: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Two columns of the rotation (B, 2, 3) and scores of opening (B,) and collisions (B,)."""
         out = self.act(torch.cat([feature, scene.query], -1)).float()
-        return out[:, :6].unflatten(-1, (2, 3)), out[:, 6], out[:, 7]
+        return out[:, :6].view(-1, 2, 3), out[:, 6], out[:, 7]
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,8 +217,8 @@ def upright(columns: Tensor) -> Tensor:
     return torch.stack([x, y, torch.linalg.cross(x, y)], -1)
 
 
-def _groups(inputs: Inputs, size: int) -> tuple[Tensor, Tensor]:
-    return inputs.points.unflatten(1, (-1, size)), inputs.colors.unflatten(1, (-1, size))
+def _groups(inputs: Inputs, size: int) -> tuple[Tensor, ...]:
+    return tuple(each.view(len(each), -1, size, 3) for each in (inputs.points, inputs.colors))
 
 
 def _nearest(places: Tensor, around: Tensor, count: int) -> Tensor:

@@ -60,7 +60,7 @@ class RegressorConfig:
     cache: Path = Path("runs/baselines/samples")
     steps: int = 6000
     batch: int = 16
-    learning_rate: float = 1e-3
+    learning_rate: float = 6e-4
     warm_up: int = 300
     weight_decay: float = 0.01
     clip: float = 5.0

@@ -82,7 +82,7 @@ def draw(points: Tensor, colors: Tensor, size: float, pixels: int) -> Tensor:
             known.gather(1, order.gather(1, hit % (N + 1))[:, :-1, None].expand(-1, -1, known.shape[-1]))
             for hit in (nearest, farthest)
         ]
-        views.append(torch.cat(sides, -1).transpose(1, 2).unflatten(-1, (pixels, pixels)))
+        views.append(torch.cat(sides, -1).transpose(1, 2).reshape(B, -1, pixels, pixels))
     return torch.stack(views, 1)
 
 
@@ -143,8 +143,7 @@ class Look(nn.Module):
         """
         B, side, patch = len(views), self.side, self.config.patch
         images = views.flatten(0, 1)
-        tokens = self.patches(images).flatten(2).transpose(1, 2).unflatten(0, (B, 3)) + self.place
-        tokens = tokens.flatten(0, 1)
+        tokens = self.patches(images).flatten(2).transpose(1, 2) + self.place.repeat(B, 1, 1)
         for block, adapter in zip(self.apart, adapters, strict=False):
             each = None if adapter is None else adapter.expand(B, -1).repeat_interleave(3, 0)
             tokens = block(tokens, adapter=each)
@@ -156,7 +155,7 @@ class Look(nn.Module):
         seen = seen.permute(0, 3, 1, 4, 2, 5).flatten(4, 5).flatten(2, 3)
         features = F.gelu(self.mix(torch.cat([seen, F.gelu(self.pixels(images))], 1)))
         heat = self.heat(features).reshape(B, 3, self.config.pixels, self.config.pixels)
-        return heat, features.unflatten(0, (B, 3)), joint
+        return heat, features.view(B, 3, -1, *features.shape[2:]), joint
 
 
 class ViewsNetwork(nn.Module):
@@ -236,8 +235,8 @@ class ViewsNetwork(nn.Module):
         """Scores of angles (B, 3, BINS), opening (B,) and collisions (B,), from where the heat (sum 1) is."""
         side, patch = self.near.side, self.config.patch
         B = len(heat)
-        by_patch = heat.unflatten(-1, (side, patch)).unflatten(2, (side, patch)).sum((3, 5)).flatten(2)
-        seen = tokens[:, : 3 * side**2].unflatten(1, (3, side**2))
+        by_patch = heat.view(B, 3, side, patch, side, patch).sum((3, 5)).flatten(2)
+        seen = tokens[:, : 3 * side**2].reshape(B, 3, side**2, -1)
         there = torch.einsum("bvp,bvpc->bvc", by_patch, seen.float())
         fine = torch.einsum("bvij,bvcij->bvc", heat, features.float())
         most, gripper = tokens[:, : 3 * side**2].amax(1), tokens[:, 3 * side**2]
