@@ -5,7 +5,16 @@ from imop.evaluation.benchmark import shown_together
 from imop.evaluation.methods import make_policy
 from imop.evaluation.oracle import OraclePolicy
 from imop.evaluation.rollout import rollout
-from imop.evaluation.trials import DEMONSTRATION_SEED, Trial, change_notes, demonstration_for, suite_trials
+from imop.evaluation.trials import (
+    DEMONSTRATION_SEED,
+    Trial,
+    change_notes,
+    demonstration_for,
+    demonstrations_for,
+    disturbed,
+    most_actions,
+    suite_trials,
+)
 
 
 def test_scenes_that_would_be_those_of_demonstrations_are_refused_before_any_is_tried():
@@ -75,3 +84,35 @@ def test_a_demonstration_may_show_another_variation_and_the_scene_stays():
     assert plain.demonstrated == plain
     poses = [t.env().world.pose("button0/body") for t in (trial, plain)]
     assert (poses[0] == poses[1]).all()
+
+
+def test_tasks_in_which_a_disturbance_cannot_happen_are_left_out():
+    trials = suite_trials("tabletop", "all", ("lid_off_pot", "press_buttons"), 2, 0, 0)
+    assert list(disturbed(trials, "moved")) == list(trials)
+    (lids,) = disturbed(trials, "knocked").values()
+    assert [trial.task for trial in lids] == 2 * ["tabletop/lid_off_pot"]
+    assert {(trial.disturb, trial.second_try) for trial in lids} == {("knocked", True)}
+    for kind, field in (("shut", "disturb"), ("stolen", "disturb")):
+        with pytest.raises(InvalidInput) as error:
+            disturbed(trials, kind)
+        assert error.value.field == field
+
+
+def test_who_may_try_again_has_more_actions_than_were_shown():
+    trial, shown = Trial("tabletop/lid_off_pot", 0), [None] * 3
+    task = trial.make_task()
+    assert most_actions("replay", shown, trial, task) == 3
+    for again in (Trial(trial.task, 0, disturb="moved"), Trial(trial.task, 0, second_try=True)):
+        assert most_actions("replay", shown, again, task) == task.step_limit > 3
+
+
+def test_further_demonstrations_show_instances_that_are_never_tried():
+    trial = Trial("tabletop/lid_off_pot", 3, 0, 9, shown=0, demonstrations=3)
+    shown = demonstrations_for(trial)
+    instances = [demonstration.seeds["instance"] for demonstration in shown]
+    assert instances[0] == 0 and len(set(instances)) == 3
+    assert min(instances[1:]) > 2 * DEMONSTRATION_SEED
+    assert min(demonstration.seeds["episode"] for demonstration in shown) >= DEMONSTRATION_SEED
+    assert shown_together(trial) != shown_together(Trial("tabletop/lid_off_pot", 3, 0, 9, shown=0))
+    with pytest.raises(InvalidInput, match="demonstrations"):
+        Trial("tabletop/lid_off_pot", 3, demonstrations=0)

@@ -13,6 +13,7 @@ from imop.geometry.neighbours import nearest
 from imop.geometry.view_alignment import corrected, find_errors
 from imop.networks.model import Model, ModelConfig, save_model
 from imop.policy.one_shot import CLEARANCE, OneShotPolicy, above_ground
+from imop.policy.recovery import ARRIVED
 from imop.policy.registration import RegistrationMatcher
 from imop.policy.router import AdvancingRouter, LearnedRouter
 from tests.policy.scenes import TABLE, above, scene, table, transitions
@@ -126,6 +127,36 @@ def test_if_nothing_can_be_reached_the_best_is_given_and_that_is_said(perception
     assert se3.translation_distance(stuck.T_world_gripper, free.T_world_gripper) < 0.02
 
 
+def test_what_could_not_be_carried_out_is_tried_elsewhere(policy, wanted):
+    first, second = wanted.keyframes[0].observation, wanted.keyframes[1].observation
+    begun = policy.act(first)
+    again = policy.act(first)
+    assert again.match.step == 0
+    assert not se3.near(again.T_world_gripper, begun.T_world_gripper, *ARRIVED)
+    arrived = replace(second, T_world_gripper=again.T_world_gripper)
+    assert policy.act(arrived).match.step == 1
+
+
+def test_the_same_demonstration_again_changes_nothing(perception, policy, shown, wanted):
+    twice = OneShotPolicy(RegistrationMatcher.from_pretrained(), perception)
+    for _ in range(2):
+        twice.watch(shown.stripped())
+    for keyframe in wanted.keyframes:
+        assert same(policy.act(keyframe.observation), twice.act(keyframe.observation))
+
+
+def test_of_several_demonstrations_the_one_that_is_found_is_followed(perception, shown, wanted):
+    """Nothing is left of the other one but its robot."""
+    policy = OneShotPolicy(RegistrationMatcher.from_pretrained(), perception)
+    bare = [replace(k, observation=_without_things(k.observation)) for k in shown.keyframes]
+    policy.watch(replace(shown, keyframes=tuple(bare), final=_without_things(shown.final)).stripped())
+    policy.watch(shown.stripped())
+    alone = OneShotPolicy(RegistrationMatcher.from_pretrained(), perception)
+    alone.watch(shown.stripped())
+    for keyframe in wanted.keyframes:
+        assert same(policy.act(keyframe.observation), alone.act(keyframe.observation))
+
+
 def test_the_action_says_who_proposed_it_and_how_it_moved_the_demonstrated_pose(policy, shown, wanted):
     action = policy.act(wanted.keyframes[0].observation)
     demonstrated = shown.keyframes[0].action.T_world_gripper
@@ -177,15 +208,19 @@ def test_an_empty_table_is_no_confident_match(perception, shown, wanted):
     strict = OneShotPolicy(RegistrationMatcher.from_pretrained(), perception, min_confidence=0.5)
     strict.watch(shown)
     seen = wanted.keyframes[0].observation
+    with pytest.raises(NoConfidentMatch) as error:
+        strict.act(_without_things(seen))
+    assert error.value.confidence < 0.5
+    # The step was not taken: the same policy finds it when the pot is back.
+    assert strict.act(seen).match.step == 0
+
+
+def _without_things(seen):
     views = {
         name: replace(view, depth=np.where(np.isin(view.instance_ids, _things(seen)), 0, view.depth))
         for name, view in seen.views.items()
     }
-    with pytest.raises(NoConfidentMatch) as error:
-        strict.act(replace(seen, views=views))
-    assert error.value.confidence < 0.5
-    # The step was not taken: the same policy finds it when the pot is back.
-    assert strict.act(seen).match.step == 0
+    return replace(seen, views=views)
 
 
 def _things(observation):

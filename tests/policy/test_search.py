@@ -1,11 +1,12 @@
 """One search in one scene, on boxes: what is proposed, laid down, told apart, and when it ends."""
 
 import numpy as np
+import pytest
 import torch
 
 from imop.geometry import se3
 from imop.networks.verification import EVIDENCE
-from imop.policy.interfaces import BEGINNING, PolicyConfig, Progress, Scene
+from imop.policy.interfaces import BEGINNING, PolicyConfig, Progress, Scene, Tried
 from imop.policy.proposals import Asked, Matches
 from imop.policy.region import Region
 from imop.policy.search import StepSearch
@@ -86,6 +87,34 @@ def test_two_equal_things_are_two_candidates():
     found = search().locate(query(THERE, other))
     for pose in (THERE, other):
         assert min(off(c, pose)[0] for c in found if c.probability > 0.7) < 0.01
+
+
+def test_where_it_was_in_vain_is_looked_for_last():
+    """Of two equal things the other one comes first, and at once if the arm cannot go to the first."""
+    both = query(THERE, at(0.0, 0.2))
+    first, *_ = free = search().locate(both)
+    T_tried = first.T_query_support @ GRASP
+    for luck in (0.0, 0.1):
+        found = search().locate(both, Progress(tried=(Tried(T_tried, luck),)))
+        again = [se3.near(c.T_query_support @ GRASP, T_tried, 0.02, 0.17) for c in found]
+        assert not again[0] and found[0].probability == pytest.approx(free[0].probability, abs=0.1)
+        assert luck or not any(c.probability for c, tried in zip(found, again, strict=True) if tried)
+
+
+def test_what_was_tried_elsewhere_changes_nothing():
+    (free, *_), (found, *_) = (
+        search().locate(query(THERE), Progress(tried=tried)) for tried in ((), (Tried(HOME, 0.0),))
+    )
+    assert found.probability == free.probability
+    np.testing.assert_array_equal(found.T_query_support, free.T_query_support)
+
+
+def test_one_failure_does_not_outweigh_what_is_certain():
+    """Bad luck is likelier than something that nothing speaks for."""
+    first, *_ = search().locate(query(THERE))
+    tried = Tried(first.T_query_support @ GRASP, 0.1)
+    again, *_ = search().locate(query(THERE), Progress(tried=(tried,)))
+    assert off(again)[0] < 0.01 and again.probability < first.probability
 
 
 def test_of_several_things_the_one_of_the_same_colour_is_likelier():

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from imop.errors import InvalidInput
 from imop.geometry import se3
-from imop.tasks.env import make_env, to_action, to_array, to_observation
+from imop.tasks.env import ImopEnv, make_env, make_task, to_action, to_array, to_observation
 from imop.types import Action
 
 LID = "tabletop/lid_off_pot"
@@ -57,6 +57,18 @@ def test_a_motion_that_cannot_be_planned_ends_the_episode_without_reward(env, p,
     _, reward, terminated, truncated, info = env.step(action)
     assert (reward, terminated, truncated) == (0.0, True, False)
     assert info["plan_failed"] == reason
+
+
+def test_with_a_second_try_the_episode_goes_on_from_the_same_state():
+    env = ImopEnv(make_task(LID), second_try=True)
+    env.reset(seed=2)
+    before = env.world.save_state().physics
+    action = to_array(Action(se3.make(np.diag([1.0, -1.0, -1.0]), (2.0, 0, 1)), True))
+    _, reward, terminated, truncated, info = env.step(action)
+    assert (reward, terminated, truncated) == (0.0, False, False) and info["plan_failed"]
+    np.testing.assert_array_equal(env.world.save_state().physics, before)
+    assert env.observation.time_step == 1
+    assert [env.step(waypoint_action(env, step))[1] for step in range(3)][-1] == 1
 
 
 def test_the_step_limit_truncates():

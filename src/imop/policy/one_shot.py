@@ -23,7 +23,7 @@ from imop.policy.interfaces import (
     Transition,
 )
 from imop.policy.learned import LearnedMatcher
-from imop.policy.recovery import Attempts
+from imop.policy.recovery import Attempts, same_place
 from imop.policy.router import AdvancingRouter, LearnedRouter, Option, Router
 from imop.types import Action, Demonstration, FloatArray, Match, Observation
 
@@ -65,6 +65,7 @@ class OneShotPolicy:
         self._feasible = feasible
         self._demonstrations: list[list[Transition]] = []
         self._prepared: list[list[PreparedStep]] = []
+        self._same_place: list[list[bool]] = []
         self._cameras: set[str] = set()
         self._camera_errors: dict[str, FloatArray] = {}
         self._progress: dict[int, Progress] = {}
@@ -130,7 +131,9 @@ class OneShotPolicy:
         ]
         self._cameras |= set(observations[0].views)
         self._demonstrations.append(steps)
-        self._prepared.append(list(self._matcher.prepare(steps)))
+        prepared = list(self._matcher.prepare(steps))
+        self._prepared.append(prepared)
+        self._same_place.append(same_place(prepared))
         self.router.watch(steps)
 
     def reset(self) -> None:
@@ -142,7 +145,8 @@ class OneShotPolicy:
     def act(self, observation: Observation, focus: Focus | None = None) -> Action:
         """The action for what is seen now, with its confidence and the matched points.
 
-        If the arm is not where the last action sent it, that step is tried again, elsewhere.
+        If the arm is not where the last action sent it, that step is tried again, elsewhere. If what the
+        last action came to has been moved since, it is done again.
 
         Args:
             observation: what is seen.
@@ -164,7 +168,7 @@ class OneShotPolicy:
         if not self._attempts.arrived(observation):
             self.router.undo()
             self._progress = self._before
-        option, action = self._likeliest(query, self.router.options(query))
+        option, action = self._checked(query, *self._likeliest(query, self.router.options(query)))
         self.router.took(option.demonstration, option.step)
         self._attempts.took(option, action.T_world_gripper)
         assert action.match is not None
@@ -192,6 +196,19 @@ class OneShotPolicy:
         if not found:
             raise failure
         return max(found, key=lambda pair: pair[0].weight * pair[1].confidence)
+
+    def _checked(self, query: Scene, option: Option, action: Action) -> tuple[Option, Action]:
+        """The same, or the step before and its action, if what it acted on is not where it was."""
+        number, step = option.demonstration, option.step
+        last = self._progress.get(number, BEGINNING).T_last
+        if last is None or not self._same_place[number][step]:
+            return option, action
+        T_shown = self._demonstrations[number][step].action.T_world_gripper
+        if not self._attempts.undone(option, action.T_world_gripper, last @ T_shown):
+            return option, action
+        assert action.match is not None
+        progress = Progress(action.match.T_query_support)
+        return replace(option, step=step - 1), self.locate(query, step - 1, number, progress)
 
     def see(
         self, observation: Observation, focus: Focus | None = None, earlier: Scene | None = None
