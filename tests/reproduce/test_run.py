@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from imop.errors import InvalidInput
+from imop.errors import CorruptData, InvalidInput
 from imop.evaluation import benchmark
 from imop.evaluation.episodes import Episode, EpisodeLog, method_state
 from imop.evaluation.report import Count
@@ -131,10 +131,23 @@ def test_a_row_changes_nothing_but_what_it_names_in_its_scenes():
         Row("none", "learned", disturb="by no one").tried_in(scenes)
 
 
-@pytest.mark.parametrize("episodes", [0, -1])
-def test_no_scenes_are_refused(tmp_path, episodes):
-    with pytest.raises(InvalidInput, match="episodes"):
-        measure(TABLE, Options(tmp_path, episodes=episodes), QUIET)
+@pytest.mark.parametrize(
+    "wrong", [{"episodes": 0}, {"seed": -1}, {"seed": 999_999, "episodes": 2}, {"jobs": 0}]
+)
+def test_options_that_mean_nothing_are_refused(wrong):
+    with pytest.raises(InvalidInput):
+        Options(**wrong)
+
+
+def test_a_method_that_the_table_does_not_have_is_refused(tmp_path):
+    with pytest.raises(InvalidInput, match="lerned"):
+        measure(TABLE, Options(tmp_path, methods=("lerned",)), QUIET)
+
+
+def test_a_log_that_cannot_be_read_ends_the_command(tmp_path):
+    (tmp_path / LOG).write_text("nonsense\n")
+    with pytest.raises(CorruptData):
+        measure(TABLE, Options(tmp_path, seed=20), QUIET)
 
 
 def test_before_anything_is_measured_the_published_rows_are_there():
