@@ -5,13 +5,13 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from imop.errors import InvalidInput
+from imop.errors import CorruptData, InvalidInput
 from imop.evaluation import benchmark
 from imop.evaluation.episodes import Episode, EpisodeLog, method_state
 from imop.evaluation.report import Count
 from imop.reproduce import run
 from imop.reproduce.run import LOG, Options, measure, not_measured, rows_of, trials_of
-from imop.reproduce.table import Row, Section
+from imop.reproduce.table import Row, Section, SuiteSection
 from imop.reproduce.tables import TABLES, find_table
 from tests.reproduce.tables import LEARNED, REPLAY, SECTION, TABLE
 
@@ -106,9 +106,14 @@ def test_scenes_in_which_no_disturbance_happened_do_not_count(tmp_path, monkeypa
             (t, m): Episode(t, m, "s", True, "r", disturbed=t.seed % 2 == 0) for t in trials for m in methods
         }
 
+    class Two(SuiteSection):
+        def trials(self, episodes, seed):
+            everything = super().trials(episodes, seed)
+            return {task: everything[task] for task in ("open_drawer", "stack_cubes")}
+
     monkeypatch.setattr(run, "tried", tried)
     moved = Row("replay, moved", "replay", disturb="moved", demonstrations=3)
-    table = replace(TABLE, sections=(replace(SECTION, rows=(REPLAY, moved)),))
+    table = replace(TABLE, sections=(Two("Two", (REPLAY, moved), suite="tabletop"),))
     (section,) = measure(table, Options(tmp_path, seed=20), QUIET).sections
     still, disturbed = section.rows
     assert set(still.counts.values()) == {Count(4, 4)} and set(disturbed.counts.values()) == {Count(2, 2)}
@@ -126,10 +131,23 @@ def test_a_row_changes_nothing_but_what_it_names_in_its_scenes():
         Row("none", "learned", disturb="by no one").tried_in(scenes)
 
 
-@pytest.mark.parametrize("episodes", [0, -1])
-def test_no_scenes_are_refused(tmp_path, episodes):
-    with pytest.raises(InvalidInput, match="episodes"):
-        measure(TABLE, Options(tmp_path, episodes=episodes), QUIET)
+@pytest.mark.parametrize(
+    "wrong", [{"episodes": 0}, {"seed": -1}, {"seed": 999_999, "episodes": 2}, {"jobs": 0}]
+)
+def test_options_that_mean_nothing_are_refused(wrong):
+    with pytest.raises(InvalidInput):
+        Options(**wrong)
+
+
+def test_a_method_that_the_table_does_not_have_is_refused(tmp_path):
+    with pytest.raises(InvalidInput, match="lerned"):
+        measure(TABLE, Options(tmp_path, methods=("lerned",)), QUIET)
+
+
+def test_a_log_that_cannot_be_read_ends_the_command(tmp_path):
+    (tmp_path / LOG).write_text("nonsense\n")
+    with pytest.raises(CorruptData):
+        measure(TABLE, Options(tmp_path, seed=20), QUIET)
 
 
 def test_before_anything_is_measured_the_published_rows_are_there():

@@ -46,6 +46,12 @@ def test_measured_and_published_numbers_stand_side_by_side():
     assert worse[0] == "worse, published"
 
 
+def test_a_mean_over_fewer_tasks_says_so():
+    rows = assemble((LEARNED, REPLAY), {"learned": A, "replay": {"one": B["one"]}}, {})
+    _, learned, replay, *_ = summary(table(*rows).sections[0])
+    assert replay[1].endswith("of 1 tasks") and "tasks" not in learned[1]
+
+
 def test_what_was_not_measured_is_said_with_what_would_help():
     text = markdown(table(*ROWS))
     assert "not measured: elsewhere (no weights; make it)." in text and "- Note." in text

@@ -9,11 +9,12 @@ from pathlib import Path
 from rich.console import Console
 
 from imop.baselines.policy import REGRESSORS
-from imop.errors import ImopError, InvalidInput
+from imop.errors import CorruptData, ImopError, InvalidInput
 from imop.evaluation.benchmark import tried
 from imop.evaluation.episodes import Episode, EpisodeLog, method_state
+from imop.evaluation.jobs import check_jobs
 from imop.evaluation.methods import make_policy
-from imop.evaluation.trials import Trial
+from imop.evaluation.trials import DEMONSTRATION_SEED, Trial
 from imop.networks.model import WEIGHTS
 from imop.reproduce.chains import against_parts
 from imop.reproduce.measured import NOT_YET, Measured, MeasuredRow, MeasuredSection, Outcomes, assemble
@@ -37,6 +38,9 @@ class Options:
         seed: of the first scene.
         jobs: processes.
         methods: only rows of these are tried, all if empty; the others are printed as far as they are logged.
+
+    Raises:
+        InvalidInput: for no scenes, seeds of demonstrations, or no processes.
     """
 
     out: Path = Path("runs/reproduce")
@@ -45,6 +49,13 @@ class Options:
     seed: int = 7000
     jobs: int = 2
     methods: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.episodes is not None and self.episodes < 1:
+            raise InvalidInput("episodes", f"{self.episodes}", "at least 1")
+        if not 0 <= self.seed < DEMONSTRATION_SEED - (self.episodes or 0):
+            raise InvalidInput("seed", f"{self.seed}", f"scenes from 0 to {DEMONSTRATION_SEED - 1}")
+        check_jobs(self.jobs)
 
     def command(self, table: Table) -> str:
         """What one types to measure the table so."""
@@ -99,11 +110,12 @@ def measure(table: Table, options: Options, console: Console) -> Measured:
     """Try what can be tried, and say of the rest why not.
 
     Raises:
-        InvalidInput: for no scenes, or seeds of demonstrations.
+        InvalidInput: if a method is chosen that the table does not have.
         CorruptData: if the log cannot be read.
     """
-    if options.scenes(table) < 1:
-        raise InvalidInput("episodes", f"{options.episodes}", "at least 1")
+    known = {row.method: None for section in table.sections for row in section.rows}
+    if unknown := [method for method in options.methods if method not in known]:
+        raise InvalidInput("methods", unknown[0], ", ".join(known) or "none, for there are none to measure")
     sections = tuple(_measured(table, section, options, console) for section in table.sections)
     parts = {chain: of_chain for section in table.sections for chain, of_chain in section.parts().items()}
     measured = _described(table, options, sections)
@@ -138,6 +150,8 @@ def _measured(table: Table, section: Section, options: Options, console: Console
         console.print(f"{section.title}: {names}")
         try:
             outcomes |= _tried(together, trials, table.focus, options, console)
+        except CorruptData:
+            raise  # of the log, which all rows need
         except ImopError as error:
             missing |= {row.label: str(error) for row in together}
     if left_out := [row for row in there if not options.tries(row)]:

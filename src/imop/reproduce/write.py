@@ -136,12 +136,12 @@ def summary(section: MeasuredSection, columns: Sequence[str] = ()) -> Grid:
     head += ["as published"] * has["published"]
     head += ["compared with", "only that / only this", "p"] * has["pairs"]
     head += [extra[column] for column in columns]
-    rows = [_cells_of_measured(row, head) for row in section.rows]
+    rows = [_cells_of_measured(row, tasks, head) for row in section.rows]
     rows += [_cells_of_published(row, section, head) for row in section.published]
     return [head, *rows]
 
 
-def _cells_of_measured(row: MeasuredRow, head: Sequence[str]) -> list[str]:
+def _cells_of_measured(row: MeasuredRow, tasks: int, head: Sequence[str]) -> list[str]:
     pairs = row.pairs
     cells = {
         "rank": _number(row.rank),
@@ -151,7 +151,7 @@ def _cells_of_measured(row: MeasuredRow, head: Sequence[str]) -> list[str]:
         "kept of what the other solves": str(pairs.kept) if pairs else _NOTHING,
         "parameters": _NOTHING if row.parameters is None else f"{row.parameters / 1e6:.2f} M",
     }
-    average = _average(row) if row.counts else "not measured"
+    average = _average(row, tasks) if row.counts else "not measured"
     return [row.label, average, *(cells.get(name, _NOTHING) for name in head[2:])]
 
 
@@ -209,10 +209,11 @@ def _count(count: Count | None) -> str:
     return _NOTHING if count is None or not count.trials else str(count).replace(" %", "", 1)
 
 
-def _average(row: MeasuredRow) -> str:
+def _average(row: MeasuredRow, tasks: int) -> str:
     assert row.average is not None and row.interval is not None
     low, high = row.interval
-    return f"{100 * row.average:.1f} [{100 * low:.0f}, {100 * high:.0f}]"
+    own = sum(count.trials > 0 for count in (row.counts or {}).values())
+    return f"{100 * row.average:.1f} [{100 * low:.0f}, {100 * high:.0f}]" + f" of {own} tasks" * (own < tasks)
 
 
 def _number(value: float | None) -> str:
