@@ -155,7 +155,8 @@ class PointsNetwork(nn.Module):
     def _scores(self, scene: "_Scene", features: Tensor, stage: int) -> Tensor:
         query = self.score[stage](scene.query)
         products: Tensor = torch.einsum("bgc,bc->bg", features.float(), query.float())
-        return products / query.shape[-1] ** 0.5
+        scores: Tensor = products / query.shape[-1] ** 0.5
+        return scores
 
     def _act(self, scene: "_Scene", feature: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Two columns of the rotation (B, 2, 3) and scores of opening (B,) and collisions (B,)."""
