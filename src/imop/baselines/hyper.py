@@ -100,7 +100,7 @@ class HyperConfig:
         learning_rate: at its peak.
         warm_up: steps until the peak.
         every: steps between checkpoints.
-        held_back: every so many-th demonstration is for validation only.
+        held_back: every so many-th demonstration is not learnt, as in the training of the network.
         seed: of weights and what is drawn.
     """
 
@@ -151,7 +151,7 @@ def train_hyper(
         step += 1
         if step % config.every == 0 or step == last:
             reached: dict[str, Any] = {"step": step, "seconds": round(time.monotonic() - started)}
-            reached |= {name: round(float(value), 4) for name, value in parts.items()}
+            reached |= {name: round(float(value.detach()), 4) for name, value in parts.items()}
             _save(config, hyper, optimizer, reached, card["sha256"], samples)
             if console is not None:
                 console.print(json.dumps(reached))
