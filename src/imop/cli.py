@@ -171,8 +171,9 @@ def evaluate(
         tasks: names within the split; all if none is given.
         methods: any of replay, textbook (FPFH, RANSAC and ICP of Open3D, extra baselines), registration,
             learned, routed (learned, and the routing network may go back to a step), paper (the paper's
-            networks and one fit, no search), oracle (true object poses), expert, or one's own
-            (my_methods:MyPolicy), joined by commas.
+            networks and one fit, no search), act3d and rvt (regressors in the manner of these), rvt_ft and
+            rvt_hdt (rvt, fine-tuned on the demonstration of a novel task), oracle (true object poses),
+            expert, or one's own (my_methods:MyPolicy), joined by commas.
         episodes: scenes per task, spread over its variations.
         seed: first seed of the scenes.
         instance: seed of the demonstrated objects' shapes, sizes and colours.

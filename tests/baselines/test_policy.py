@@ -113,7 +113,7 @@ def test_fitting_adapters_leaves_the_network_and_helps(folder):
     network, samples = load_network(folder / "views", "views")[0], some_samples(1, seed=5)
     before = {name: tensor.clone() for name, tensor in network.state_dict().items()}
     first = make_hyper_network(network)([described(network, samples, np.arange(1))])
-    config = AdaptConfig(steps=60, batch=4, learning_rate=1e-2)
+    config = AdaptConfig(steps=25, batch=2, learning_rate=1e-2)
     adapters = tuned_adapters(network, samples, first, config)
     assert all(torch.equal(before[name], tensor) for name, tensor in network.state_dict().items())
     assert _loss(network, samples, adapters) < 0.97 * _loss(network, samples, first)

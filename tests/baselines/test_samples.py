@@ -63,6 +63,12 @@ def test_clouds_are_made_once(tmp_path, monkeypatch):
     monkeypatch.setattr("imop.baselines.samples.samples_of", None)
     again = stored_samples(tmp_path / "demos.zarr", tmp_path / "cache", PLAIN)
     assert np.array_equal(first.points, again.points) and first.instructions == again.instructions
+    store.append(replace(told(), instructions=("lift it",)))
+    monkeypatch.undo()
+    more = stored_samples(tmp_path / "demos.zarr", tmp_path / "cache", PLAIN)
+    assert (
+        more.instructions == ("lift the cube", "lift it") and len(list((tmp_path / "cache").iterdir())) == 2
+    )
     next((tmp_path / "cache").iterdir()).write_bytes(b"nonsense")
     with pytest.raises(CorruptData, match="remove it"):
         stored_samples(tmp_path / "demos.zarr", tmp_path / "cache", PLAIN)

@@ -110,7 +110,7 @@ class Fold:
         weights: folder of a network in the manner of RVT.
         stores: with the demonstrations, one of each novel task and variation.
         out: folder for the new weights.
-        cache: folder in which every store gets one for its clouds.
+        cache: folder in which the clouds of every demonstration are kept.
         steps: of the optimizer; if None, for each demonstration as many as one alone takes.
         batch: samples of a step.
         learning_rate: at its peak.

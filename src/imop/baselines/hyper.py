@@ -94,13 +94,13 @@ class HyperConfig:
         weights: folder of the network in the manner of RVT.
         stores: demonstrations of base tasks.
         out: folder for the hyper-network.
-        cache: folder in which every store gets one for its clouds.
+        cache: folder in which the clouds of every demonstration are kept.
         steps: of the optimizer.
         batch: samples of a step, each with a demonstration of its task.
         learning_rate: at its peak.
         warm_up: steps until the peak.
         every: steps between checkpoints.
-        held_back: every so many-th demonstration is for validation only.
+        held_back: every so many-th demonstration is not learnt, as in the training of the network.
         seed: of weights and what is drawn.
     """
 

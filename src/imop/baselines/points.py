@@ -8,6 +8,7 @@ and collisions follow from its feature.
 What differs: features of the scene come from groups of points of the cloud instead of pretrained images'.
 """
 
+import math
 from dataclasses import dataclass
 
 import torch
@@ -155,8 +156,7 @@ class PointsNetwork(nn.Module):
     def _scores(self, scene: "_Scene", features: Tensor, stage: int) -> Tensor:
         query = self.score[stage](scene.query)
         products: Tensor = torch.einsum("bgc,bc->bg", features.float(), query.float())
-        scores: Tensor = products / query.shape[-1] ** 0.5
-        return scores
+        return products / math.sqrt(query.shape[-1])
 
     def _act(self, scene: "_Scene", feature: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Two columns of the rotation (B, 2, 3) and scores of opening (B,) and collisions (B,)."""

@@ -181,7 +181,7 @@ def stored_samples(
 
     Args:
         store: as `imop collect` writes it.
-        cache: folder with one file per episode, made if missing.
+        cache: folder with one file per episode, named by its digest; made if missing.
         perception: makes clouds, without the robot.
         done: told the number of every episode and how many there are.
 
@@ -194,7 +194,7 @@ def stored_samples(
     if not count:
         raise InvalidInput("stores", f"{store} is empty", "a store with demonstrations")
     for index in range(count):
-        file = cache / f"episode_{index:06d}.npz"
+        file = cache / f"{opened.digest(index)[:20]}.npz"
         if not file.is_file():
             _save(file, samples_of(perception, opened[index]))
         parts.append(_load(file))

@@ -40,7 +40,7 @@ class RegressorConfig:
         network: points, in the manner of Act3D, or views, in the manner of RVT.
         stores: demonstrations, as `imop collect` writes them.
         out: folder of the checkpoint, the weights, their card and the log.
-        cache: folder in which every store gets one for its clouds.
+        cache: folder in which the clouds of every demonstration are kept.
         steps: optimizer steps in all.
         batch: samples of a step.
         learning_rate: at its peak.
@@ -256,7 +256,7 @@ def read_stores(stores: tuple[Path, ...], cache: Path, console: Console) -> Samp
     parts = []
     for store in stores:
         with console.status(f"clouds of {store}"):
-            parts.append(stored_samples(store, cache / store.stem, perception))
+            parts.append(stored_samples(store, cache, perception))
         console.print(f"{store}: {len(parts[-1])} keyframes of {len(parts[-1].instructions)} demonstrations")
     return joined(parts)
 

@@ -110,13 +110,21 @@ class DemonstrationStore:
         except Exception as error:  # version 1 has no digest, so attributes can be anything
             raise CorruptData(where, f"the parts do not fit together ({error!r})") from error
 
+    def digest(self, index: int) -> str:
+        """The digest of episode `index`, see `imop.demos.episode.digest`, without its images.
+
+        Raises:
+            CorruptData: if the description of the episode is damaged.
+        """
+        return episode.digest(self._verified(index)[0])
+
     def digests(self) -> set[str]:
-        """The digests of all episodes, see `imop.demos.episode.digest`.
+        """The digests of all episodes.
 
         Raises:
             CorruptData: if the description of an episode is damaged.
         """
-        return {episode.digest(self._verified(index)[0]) for index in range(len(self))}
+        return {self.digest(index) for index in range(len(self))}
 
     def aims(self) -> list[tuple[str, int, int]]:
         """Task, variation, and seed of the objects (-1 if it is not known) of every episode, without images.
