@@ -53,6 +53,8 @@ def test_what_is_done_again_failed_from_there_on():
     assert [luck(attempts.go_on(step(number))) for number in (2, 3)] == [[BAD_LUCK], [BAD_LUCK]]
     assert luck(attempts.go_on(step(1))) == [BAD_LUCK, BAD_LUCK]
     assert luck(attempts.go_on(step(0))) == [BAD_LUCK]
+    # The arm is still where it was sent last.
+    assert attempts.arrived(seen(SENT)) and not attempts.arrived(seen(above(0.4, 0, 0.9)))
 
 
 def test_other_demonstrations_did_not_fail():
