@@ -60,8 +60,9 @@ class Attempts:
         """Whether the arm is where it was sent last; if not, that is remembered."""
         if self._sent is None or se3.near(observation.T_world_gripper, self._sent[2], *ARRIVED):
             return True
-        demonstration, step, T_sent = self._taken.pop()
+        demonstration, step, T_sent = self._sent
         self._failed[demonstration, step].append(Tried(T_sent, 0.0))
+        self._taken = [one for one in self._taken if one is not self._sent]
         self._sent = None
         return False
 
