@@ -1,16 +1,18 @@
 import json
 import re
+from typing import get_args
 
 import numpy as np
 import pytest
 
 from imop import DemonstrationStore
-from imop.cli import main
+from imop.cli import Disturb, main
 from imop.demos.frames import moved
 from imop.evaluation.trials import Trial, demonstration_for
 from imop.geometry import se3
 from imop.networks.model import load_model
 from imop.robots.panda import T_WORLD_BASE
+from imop.tasks.disturbances import DISTURBANCES
 from imop.training.shards import write_shard
 from tests.training.test_pairs import pair
 
@@ -197,3 +199,7 @@ def test_train_writes_weights_that_model_describes(tmp_path, capsys):
     assert load_model(tmp_path / "run").config.matching.attention == "graph"
     assert imop("model", "--weights", tmp_path / "run") == 0
     assert "matching" in capsys.readouterr().out
+
+
+def test_every_disturbance_can_be_asked_for():
+    assert set(get_args(Disturb)) == {"", *DISTURBANCES}

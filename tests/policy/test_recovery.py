@@ -1,9 +1,11 @@
 """What came to nothing is looked for elsewhere; what went well is not remembered."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from imop.geometry import se3
-from imop.policy.recovery import BAD_LUCK, Attempts
+from imop.policy.recovery import BAD_LUCK, Attempts, same_place
 from imop.policy.router import Option
 from tests.policy.scenes import above, scene
 
@@ -51,6 +53,8 @@ def test_what_is_done_again_failed_from_there_on():
     assert [luck(attempts.go_on(step(number))) for number in (2, 3)] == [[BAD_LUCK], [BAD_LUCK]]
     assert luck(attempts.go_on(step(1))) == [BAD_LUCK, BAD_LUCK]
     assert luck(attempts.go_on(step(0))) == [BAD_LUCK]
+    # The arm is still where it was sent last.
+    assert attempts.arrived(seen(SENT)) and not attempts.arrived(seen(above(0.4, 0, 0.9)))
 
 
 def test_other_demonstrations_did_not_fail():
@@ -58,3 +62,22 @@ def test_other_demonstrations_did_not_fail():
     attempts.took(step(0), SENT)
     assert attempts.go_on(step(0, demonstration=1)) == ()
     assert luck(attempts.go_on(step(0))) == [BAD_LUCK]
+
+
+def test_steps_that_are_fixed_to_the_same_points_have_the_same_place():
+    rng = np.random.default_rng(0)
+    thing = rng.uniform(-0.05, 0.05, (200, 3))
+    regions = [thing, thing + 0.002, thing[:150], thing + 0.3, np.zeros((0, 3)), thing]
+    steps = [SimpleNamespace(region=region) for region in regions]
+    assert same_place(steps) == [False, True, True, False, False, False]
+
+
+def test_a_step_is_done_again_once_if_the_next_is_found_elsewhere():
+    attempts, elsewhere = Attempts(), above(0.2, 0.0, 0.9)
+    assert not attempts.undone(step(0), elsewhere, SENT)
+    attempts.took(step(0), SENT)
+    assert not attempts.undone(step(1), above(0.11, 0.0, 0.9), SENT)
+    assert not attempts.undone(step(2), elsewhere, SENT) and not attempts.undone(step(1, 1), elsewhere, SENT)
+    assert attempts.undone(step(1), elsewhere, SENT)
+    attempts.took(step(0), elsewhere)
+    assert not attempts.undone(step(1), above(0.4, 0.0, 0.9), elsewhere)

@@ -46,23 +46,24 @@ class Attempts:
     """The actions of one episode."""
 
     def __init__(self) -> None:
+        self._sent: tuple[int, int, FloatArray] | None = None
         self._redone: set[tuple[int, int]] = set()
         self._taken: list[tuple[int, int, FloatArray]] = []
         self._failed: dict[tuple[int, int], list[Tried]] = defaultdict(list)
 
     def took(self, option: Option, T_world_gripper: FloatArray) -> None:
         """The arm is sent to a pose (4, 4), for a step."""
-        self._taken.append((option.demonstration, option.step, T_world_gripper))
+        self._sent = option.demonstration, option.step, T_world_gripper
+        self._taken.append(self._sent)
 
     def arrived(self, observation: Observation) -> bool:
         """Whether the arm is where it was sent last; if not, that is remembered."""
-        if not self._taken:
+        if self._sent is None or se3.near(observation.T_world_gripper, self._sent[2], *ARRIVED):
             return True
-        demonstration, step, T_sent = self._taken[-1]
-        if se3.near(observation.T_world_gripper, T_sent, *ARRIVED):
-            return True
+        demonstration, step, T_sent = self._sent
         self._failed[demonstration, step].append(Tried(T_sent, 0.0))
-        self._taken.pop()
+        self._taken = [one for one in self._taken if one is not self._sent]
+        self._sent = None
         return False
 
     def undone(self, option: Option, T_found: FloatArray, T_held: FloatArray) -> bool:
@@ -86,13 +87,10 @@ class Attempts:
 
         What was done for it before, and for those after it, has failed if it has to be done again.
         """
-        begun = [
-            k
-            for k, (n, step, _) in enumerate(self._taken)
-            if n == option.demonstration and step >= option.step
-        ]
-        if begun:
-            for n, step, T in self._taken[begun[0] :]:
-                self._failed[n, step].append(Tried(T, BAD_LUCK))
-            del self._taken[begun[0] :]
-        return tuple(self._failed[option.demonstration, option.step])
+        number, again = option.demonstration, option.step
+        begun = (k for k, (n, step, _) in enumerate(self._taken) if n == number and step >= again)
+        first = next(begun, len(self._taken))
+        for n, step, T in self._taken[first:]:
+            self._failed[n, step].append(Tried(T, BAD_LUCK))
+        del self._taken[first:]
+        return tuple(self._failed[number, again])
