@@ -100,7 +100,7 @@ def test_stripping_leaves_only_what_a_robot_knows():
         (Keyframe(told, Action(np.eye(4), True), "lid", np.eye(4)),), told, "tabletop/x", 2, ("do",)
     )
     bare = demo.stripped()
-    assert (bare.task, bare.variation, bare.instructions) == ("", 0, ())
+    assert (bare.task, bare.variation, bare.instructions) == ("", 0, ("do",))
     assert bare.keyframes[0].object_name is None and bare.keyframes[0].T_world_object is None
     for seen in (bare.keyframes[0].observation, bare.final):
         assert seen.instance_names is None and seen.joint_velocities is None

@@ -156,6 +156,7 @@ def evaluate(
     demonstrations: int = 1,
     jobs: int = 2,
     weights: Path | None = None,
+    baselines: Path | None = None,
     out: Path = Path("runs/eval"),
 ) -> int:
     """Success rates of several methods on the same demonstrations and scenes.
@@ -186,6 +187,8 @@ def evaluate(
         demonstrations: how many are shown, each but the first of another instance of the things.
         jobs: parallel processes.
         weights: folder that `imop train` wrote, for the learned policy; by default the bundled weights.
+        baselines: folder of the weights of act3d, rvt, rvt_ft and rvt_hdt (docs/baselines.md); by default
+            runs/baselines.
         out: folder for the results.
     """
     from imop.evaluation.benchmark import evaluate_suite
@@ -209,6 +212,7 @@ def evaluate(
         disturb,
         second_try,
         demonstrations,
+        baselines,
     )
     results.save(out)
     console.print(results.table())

@@ -288,7 +288,7 @@ class Demonstration:
         final: what was seen after the last action.
         task: "suite/name", for bookkeeping; no policy reads it.
         variation: number of the task's variation.
-        instructions: the variation in words.
+        instructions: the variation in words; only the baselines read them.
         seeds: instance and episode seed of the scene, where there is one.
     """
 
@@ -319,6 +319,9 @@ class Demonstration:
         return next(steps, len(self))
 
     def stripped(self) -> "Demonstration":
-        """The same demonstration without anything that only training or a simulator knows."""
+        """The same demonstration without anything that only training or a simulator knows.
+
+        The instructions stay: who shows a task may also say it.
+        """
         keyframes = tuple(Keyframe(k.observation.stripped(), k.action) for k in self.keyframes)
-        return Demonstration(keyframes, self.final.stripped())
+        return Demonstration(keyframes, self.final.stripped(), instructions=self.instructions)

@@ -80,7 +80,7 @@ def test_quick_is_a_part_of_every_table_that_fits_into_its_time(table):
 
 
 def test_a_task_without_a_demonstration_costs_only_the_rows_that_need_it(tmp_path, monkeypatch):
-    def tried(trials, methods, *_):
+    def tried(trials, methods, *_, **__):
         if "learned" in methods:
             raise InvalidInput("demonstration", "none", "one")
         return {(t, m): Episode(t, m, "s", True, "r") for t in trials for m in methods}
@@ -101,7 +101,7 @@ def test_a_suite_that_is_not_there_is_said(tmp_path):
 
 
 def test_scenes_in_which_no_disturbance_happened_do_not_count(tmp_path, monkeypatch):
-    def tried(trials, methods, *_):
+    def tried(trials, methods, *_, **__):
         return {
             (t, m): Episode(t, m, "s", True, "r", disturbed=t.seed % 2 == 0) for t in trials for m in methods
         }

@@ -8,6 +8,7 @@ from pathlib import Path
 from joblib import delayed
 from rich.console import Console
 
+from imop.baselines.policy import REGRESSORS
 from imop.errors import AssetMissing, ImopError, InvalidInput, MissingExtra
 from imop.evaluation.episodes import Episode, EpisodeLog, method_state
 from imop.evaluation.jobs import parallel
@@ -32,6 +33,8 @@ from imop.types import Demonstration
 NOTES = (
     "Demonstrations are per task and variation, from scenes that are never tested.",
     "The networks of learned saw synthetic pairs and base tasks with other objects; others saw nothing.",
+    "act3d and rvt are regressors in the manner of these, trained on demonstrations of base tasks; rvt_ft "
+    "and rvt_hdt are fine-tuned on the demonstration of a novel task. They are told its instruction.",
     "replay, registration and learned see four 128 x 128 RGB-D views, camera poses, joint positions and "
     "the gripper; no segmentation, names or object poses.",
     "oracle carries the demonstrated poses over by the true object pose; expert reads everything.",
@@ -65,6 +68,7 @@ def evaluate_suite(
     disturb: str = "",
     second_try: bool = False,
     demonstrations: int = 1,
+    baselines: Path | None = None,
 ) -> Results:
     """Try every method in the same `episodes` scenes of every task.
 
@@ -85,6 +89,7 @@ def evaluate_suite(
         disturb: what goes wrong once in every episode, one of `tasks.disturbances.DISTURBANCES`, if any.
         second_try: whether an episode goes on after a motion that cannot be planned, as a disturbed one does.
         demonstrations: how many are shown, each but the first of another instance.
+        baselines: folder of the regressors' weights; None for the default one.
 
     Raises:
         InvalidInput: for an unknown suite, split, task, method, change or disturbance, no demonstration, or
@@ -99,7 +104,7 @@ def evaluate_suite(
     without = set(trials)
     trials = disturbed(trials, disturb) if disturb else trials
     everything = [trial for of_task in trials.values() for trial in of_task]
-    found = tried(everything, methods, jobs, console, log, weights)
+    found = tried(everything, methods, jobs, console, log, weights, baselines=baselines)
     counts = {
         method: {task: count_of([found[trial, method] for trial in trials[task]]) for task in trials}
         for method in methods
@@ -145,6 +150,7 @@ def tried(
     log: Path,
     weights: Path | None = None,
     focus: bool = False,
+    baselines: Path | None = None,
 ) -> dict[tuple[Trial, str], Episode]:
     """The episode of every method in every scene: from the log, or tried now and added to it.
 
@@ -156,20 +162,25 @@ def tried(
         CorruptData: if the log cannot be read.
         ExpertFailed, NoRoom: if there is no demonstration for a scene.
     """
+    folders = {method: baselines if method in REGRESSORS else weights for method in methods}
     for method in methods:
         if method not in ("oracle", "expert"):
-            policy = make_policy(method, weights=weights)  # what is missing is said before anything is tried
+            # What is missing is said before anything is tried.
+            policy = make_policy(method, weights=folders[method])
         if focus and (method in ("oracle", "expert") or not isinstance(policy, OneShotPolicy)):
             raise InvalidInput("focus", f"{method} takes none", "learned, routed, registration, textbook")
     known = EpisodeLog(log)
-    state = cache(lambda task, method: method_state(method, weights, task) + ("-focus" if focus else ""))
+    state = cache(
+        lambda task, method: method_state(method, folders[method], task) + ("-focus" if focus else "")
+    )
     wanted = [(trial, method, state(trial.task, method)) for trial in trials for method in methods]
     missing = [one for one in wanted if known.find(*one) is None]
     shown = _demonstrations([trial for trial, _, _ in missing], jobs, console)
     # Who has watched a demonstration acts in all of its scenes before another one is watched.
     missing.sort(key=lambda one: (shown_together(one[0]), one[1]))
     work = [
-        delayed(attempt)(one[0], shown[shown_together(one[0])], *one[1:], weights, focus) for one in missing
+        delayed(attempt)(one[0], shown[shown_together(one[0])], *one[1:], folders[one[1]], focus)
+        for one in missing
     ]
     for episode in parallel(work, jobs, console, "episodes"):
         known.add(episode)

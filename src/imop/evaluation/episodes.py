@@ -7,6 +7,7 @@ from pathlib import Path
 
 import dacite
 
+import imop.baselines
 import imop.demos
 import imop.evaluation.textbook
 import imop.geometry
@@ -15,6 +16,7 @@ import imop.policy
 import imop.robots
 import imop.sim
 import imop.tasks
+from imop.baselines.policy import FOLDER, PARTS, REGRESSORS
 from imop.errors import CorruptData
 from imop.evaluation.fingerprint import code_digest, own_code_digest, weights_digest
 from imop.evaluation.methods import METHODS, find_method
@@ -85,6 +87,9 @@ def method_state(method: str, weights: Path | None, task: str) -> str:
         digests.append(code_digest(*deciding))
     if method in ("learned", "registration", "routed", "paper"):
         digests.append(weights_digest(weights or BUNDLED))
+    if method in REGRESSORS:
+        digests.append(code_digest(imop.baselines))
+        digests += [weights_digest((weights or FOLDER) / part) for part in PARTS[method]]
     own = [find_task(task)] + ([] if method in METHODS else [find_method(method)])
     return "-".join([*digests, *own_code_digest(*own)])
 

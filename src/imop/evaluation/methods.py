@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Protocol, cast
 
 from imop import plugins
+from imop.baselines.policy import REGRESSORS, make_regressor
 from imop.errors import InvalidInput
 from imop.evaluation.oracle import OraclePolicy, Poses
 from imop.evaluation.replay import ReplayPolicy
@@ -19,7 +20,17 @@ from imop.policy.paper import paper_policy
 from imop.policy.registration import RegistrationMatcher
 from imop.types import Action, Demonstration, Observation
 
-METHODS = ("replay", "textbook", "registration", "learned", "routed", "paper", "oracle", "expert")
+METHODS = (
+    "replay",
+    "textbook",
+    "registration",
+    "learned",
+    "routed",
+    "paper",
+    *REGRESSORS,
+    "oracle",
+    "expert",
+)
 _OWN = (
     "a class or function that makes, called without arguments, an object with watch, reset and act, named "
     "module:object or by an entry point imop.methods"
@@ -50,18 +61,20 @@ def make_policy(
 
     Args:
         method: learned, routed (learned, and the routing network chooses the step), paper (the networks and
-            one fit, without search and verification), replay, registration, textbook, oracle, or one's own:
-            "module:object", or an entry point of the group imop.methods. The object makes a `Policy` when it
-            is called without arguments.
+            one fit, without search and verification), replay, registration, textbook, oracle, act3d and rvt
+            (regressors in the manner of these, which were trained on base tasks), rvt_ft and rvt_hdt (rvt,
+            fine-tuned on the demonstration of a novel task), or one's own: "module:object", or an entry point
+            of the group imop.methods. The object makes a `Policy` when it is called without arguments.
         world: the simulated world, which only the oracle reads.
         min_confidence: of the one-shot policies.
         weights: folder of the networks' weights; by default the bundled ones. Registration asks the
-            verification network alone.
+            verification network alone. Of the regressors, the folder of points/, views/ and views_hdt/.
         robot: name of the robot, see `robot_functions`; one's own method deals with it itself.
 
     Raises:
         InvalidInput: for an unknown method or robot, what makes no policy, or an oracle without a world.
         MissingExtra: for textbook without Open3D.
+        AssetMissing: for a regressor without weights.
     """
     if method == "replay":
         return ReplayPolicy()
@@ -79,6 +92,8 @@ def make_policy(
         )
     if method == "paper":
         return paper_policy(weights or BUNDLED, perception, min_confidence, reachable)
+    if method in REGRESSORS:
+        return make_regressor(method, perception, weights)
     if method == "oracle" and world is not None:
         return OraclePolicy(world)
     policy = find_method(method)()

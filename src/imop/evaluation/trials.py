@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from imop.baselines.policy import REGRESSORS
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.splits import chosen_tasks
 from imop.sim.sensing import Sensing
@@ -246,5 +247,6 @@ def change_notes(trials: Mapping[str, Sequence[Trial]], change: str) -> list[str
 
 
 def most_actions(method: str, demonstration: Demonstration, trial: Trial, task: Task) -> int:
-    """As many as were demonstrated, or as the task allows to those who may try again."""
-    return task.step_limit if method in ("routed", "paper") or trial.second_try else len(demonstration)
+    """As many as were demonstrated, or as the task allows to those who may try again or follow no order."""
+    free = trial.second_try or method in ("routed", "paper", *REGRESSORS)
+    return task.step_limit if free else len(demonstration)

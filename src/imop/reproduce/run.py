@@ -14,10 +14,9 @@ from imop.evaluation.episodes import Episode, EpisodeLog, method_state
 from imop.evaluation.jobs import check_jobs
 from imop.evaluation.methods import make_policy
 from imop.evaluation.trials import DEMONSTRATION_SEED, Trial
-from imop.networks.model import WEIGHTS
 from imop.reproduce.chains import against_parts
 from imop.reproduce.measured import NOT_YET, Measured, MeasuredRow, MeasuredSection, Outcomes, assemble
-from imop.reproduce.origin import code, commit, machine, parameters
+from imop.reproduce.origin import code, commit, machine, parameters, weight_files
 from imop.reproduce.table import Row, Section, Table
 
 LOG = "episodes.jsonl"
@@ -182,7 +181,8 @@ def _tried(
     scenes = rows[0].tried_in(trials)
     everything = [trial for of_task in scenes.values() for trial in of_task]
     methods, log = [row.method for row in rows], options.out / LOG
-    found = tried(everything, methods, options.jobs, console, log, rows[0].weights, focus)
+    weights = rows[0].weights
+    found = tried(everything, methods, options.jobs, console, log, weights, focus, baselines=weights)
     return {
         row.label: {
             task: [_outcome(found[trial, row.method]) for trial in of_task]
@@ -212,7 +212,7 @@ def _outcome(episode: Episode) -> bool | None:
 @cache
 def why_not(row: Row) -> str:
     """Why a row cannot be tried, and what would help; empty if it can."""
-    if row.weights is not None and not (row.weights / WEIGHTS).is_file():
+    if row.weights is not None and not all(f.is_file() for f in weight_files(row.method, row.weights)):
         return f"no weights in {row.weights}; {row.made_by}"
     try:
         make_policy(row.method, weights=row.weights)
@@ -243,4 +243,7 @@ def _described(table: Table, options: Options, sections: tuple[MeasuredSection, 
 
 
 def _sized(rows: Sequence[MeasuredRow]) -> tuple[MeasuredRow, ...]:
-    return tuple(replace(row, parameters=parameters(row.method, row.weights)) for row in rows)
+    return tuple(
+        replace(row, parameters=parameters(row.method, Path(row.weights) if row.weights else None))
+        for row in rows
+    )
