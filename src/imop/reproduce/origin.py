@@ -11,7 +11,7 @@ from pathlib import Path
 from safetensors import safe_open
 
 import imop
-from imop.baselines.policy import PARTS
+from imop.baselines.policy import FOLDER, PARTS
 from imop.evaluation.fingerprint import code_digest
 from imop.networks.model import BUNDLED, WEIGHTS
 
@@ -40,22 +40,22 @@ def machine() -> str:
     return f"{platform.machine()}, {os.cpu_count()} cores"
 
 
-def parameters(method: str, weights: str) -> int | None:
-    """Numbers in all networks of a folder of weights.
+def weight_files(method: str, weights: Path | None) -> list[Path]:
+    """The files of the networks that a method uses; none for one without networks.
 
     Args:
-        method: that uses them.
-        weights: the folder; the bundled one if empty.
-
-    Returns:
-        None for a method that has other networks or none, or if the file is not there.
+        method: its name.
+        weights: the folder; None for the method's usual one.
     """
-    folder = Path(weights) if weights else BUNDLED
-    parts = PARTS.get(method, ("",) if method in _TRAINED else ())
-    files = [folder / part / WEIGHTS for part in parts]
-    if not files or not all(file.is_file() for file in files):
-        return None
-    return sum(_numbers(file) for file in files)
+    if method in PARTS:
+        return [(weights or FOLDER) / part / WEIGHTS for part in PARTS[method]]
+    return [(weights or BUNDLED) / WEIGHTS] if method in _TRAINED else []
+
+
+def parameters(method: str, weights: Path | None) -> int | None:
+    """Numbers in all networks of `weight_files`; None if there are none, or one is not there."""
+    files = weight_files(method, weights)
+    return sum(map(_numbers, files)) if files and all(file.is_file() for file in files) else None
 
 
 def _numbers(file: Path) -> int:

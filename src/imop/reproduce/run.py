@@ -8,17 +8,15 @@ from pathlib import Path
 
 from rich.console import Console
 
-from imop.baselines.policy import REGRESSORS
 from imop.errors import CorruptData, ImopError, InvalidInput
 from imop.evaluation.benchmark import tried
 from imop.evaluation.episodes import Episode, EpisodeLog, method_state
 from imop.evaluation.jobs import check_jobs
 from imop.evaluation.methods import make_policy
 from imop.evaluation.trials import DEMONSTRATION_SEED, Trial
-from imop.networks.model import WEIGHTS
 from imop.reproduce.chains import against_parts
 from imop.reproduce.measured import NOT_YET, Measured, MeasuredRow, MeasuredSection, Outcomes, assemble
-from imop.reproduce.origin import code, commit, machine, parameters
+from imop.reproduce.origin import code, commit, machine, parameters, weight_files
 from imop.reproduce.table import Row, Section, Table
 
 LOG = "episodes.jsonl"
@@ -214,8 +212,7 @@ def _outcome(episode: Episode) -> bool | None:
 @cache
 def why_not(row: Row) -> str:
     """Why a row cannot be tried, and what would help; empty if it can."""
-    alone = row.method not in REGRESSORS  # the others have a folder each, in that of the row
-    if alone and row.weights is not None and not (row.weights / WEIGHTS).is_file():
+    if row.weights is not None and not all(f.is_file() for f in weight_files(row.method, row.weights)):
         return f"no weights in {row.weights}; {row.made_by}"
     try:
         make_policy(row.method, weights=row.weights)
@@ -246,4 +243,7 @@ def _described(table: Table, options: Options, sections: tuple[MeasuredSection, 
 
 
 def _sized(rows: Sequence[MeasuredRow]) -> tuple[MeasuredRow, ...]:
-    return tuple(replace(row, parameters=parameters(row.method, row.weights)) for row in rows)
+    return tuple(
+        replace(row, parameters=parameters(row.method, Path(row.weights) if row.weights else None))
+        for row in rows
+    )
