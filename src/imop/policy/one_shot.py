@@ -71,6 +71,8 @@ class OneShotPolicy:
         self._progress: dict[int, Progress] = {}
         self._before = self._progress
         self._last: Scene | None = None
+        self.recovers = False
+        """Whether steps that came to nothing are tried again (`recovery.py`); may be set between episodes."""
         self._attempts = Attempts()
 
     @classmethod
@@ -145,8 +147,8 @@ class OneShotPolicy:
     def act(self, observation: Observation, focus: Focus | None = None) -> Action:
         """The action for what is seen now, with its confidence and the matched points.
 
-        If the arm is not where the last action sent it, that step is tried again, elsewhere. If what the
-        last action came to has been moved since, it is done again.
+        With `recovers`, a step is tried elsewhere if the arm is not where it was sent, and done again if what
+        it came to has been moved since.
 
         Args:
             observation: what is seen.
@@ -165,10 +167,12 @@ class OneShotPolicy:
                 "views", f"camera {missing[0]} is missing", f"all of {', '.join(sorted(self._cameras))}"
             )
         query = self.see(observation, focus, self._last)
-        if not self._attempts.arrived(observation):
+        if self.recovers and not self._attempts.arrived(observation):
             self.router.undo()
             self._progress = self._before
-        option, action = self._checked(query, *self._likeliest(query, self.router.options(query)))
+        option, action = self._likeliest(query, self.router.options(query))
+        if self.recovers:
+            option, action = self._checked(query, option, action)
         self.router.took(option.demonstration, option.step)
         self._attempts.took(option, action.T_world_gripper)
         assert action.match is not None
