@@ -62,19 +62,6 @@ def test_the_first_step_decides_which_demonstration_is_followed():
     assert [go(router) for _ in range(3)] == [(1, 1), (1, 2), (1, 2)]
 
 
-def test_what_is_not_in_the_hand_is_taken_anew():
-    """Open, open, close, lift, let go: the hand is empty after closing, or later on the way."""
-    openings, actions = (1.0, 1.0, 1.0, 0.4, 0.4), (True, True, False, False, True)
-    states = [scene([], HOME, opening) for opening in (*openings, 1.0)]
-    router = AdvancingRouter()
-    router.watch(transitions(states, [(HOME, wanted) for wanted in actions]))
-    held, thin, empty = (scene([], HOME, opening) for opening in (0.4, 0.05, 0.0))
-    for lost_after, query in ((2, empty), (3, empty), (2, thin), (3, held)):
-        router.reset()
-        router.took(0, lost_after)
-        assert go(router, query)[1] == (1 if query is empty else lost_after + 1)
-
-
 class Told(LearnedRouter):
     """Hears the network's probabilities from the test."""
 

@@ -27,11 +27,7 @@ from imop.networks.changes import change_graph, compared
 from imop.networks.model import Model
 from imop.networks.routing import Described, States, make_states
 from imop.policy.interfaces import Scene, Transition
-from imop.types import BoolArray, FloatArray, Observation
-
-# Fingers that are open by less than this share of their stroke hold nothing.
-EMPTY = 0.01
-
+from imop.types import BoolArray, FloatArray
 
 # Of several demonstrations those are options that are at least so plausible, against the most plausible one.
 PLAUSIBLE = 0.1
@@ -78,8 +74,7 @@ class Router(Protocol):
 class AdvancingRouter:
     """Goes through one demonstration step by step and then stays at its last.
 
-    Which one, the first step decides. It goes back to the approach if the hand is empty that held something
-    in the demonstration.
+    Which one, the first step decides.
     """
 
     def __init__(self) -> None:
@@ -96,14 +91,13 @@ class AdvancingRouter:
         self._undone: tuple[int, int] | None = None
 
     def options(self, query: Scene) -> tuple[Option, ...]:
-        """The step after the one taken last, or the approach to what was lost."""
+        """The step after the one taken last."""
         if self._last is None:
             return tuple(Option(number, 0) for number in range(len(self._demonstrations)))
         number, step = self._last
         steps = self._demonstrations[number]
         following = min(step + 1, len(steps) - 1)
-        lost = _is_empty(query.observation, steps[following].before.observation)
-        return (Option(number, _approach(steps, following) if lost else following),)
+        return (Option(number, following),)
 
     def took(self, demonstration: int, step: int) -> None:
         """The following step is next."""
@@ -112,17 +106,6 @@ class AdvancingRouter:
     def undo(self) -> None:
         """The step taken last is next."""
         self._last = self._undone
-
-
-def _is_empty(observed: Observation, shown: Observation) -> bool:
-    """Whether the fingers closed on nothing, where they held something when it was shown."""
-    return observed.gripper_opening < EMPTY and shown.gripper_opening > 2 * EMPTY
-
-
-def _approach(steps: Sequence[Transition], step: int) -> int:
-    """The last step before one (other than the first) that comes to a thing with the hand open."""
-    opened = [k for k in range(step) if steps[k].action.gripper_open]
-    return opened[-1] if opened else 0
 
 
 @dataclass(frozen=True)
