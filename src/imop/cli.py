@@ -167,7 +167,7 @@ def evaluate(
 
     Args:
         suite: tabletop, rlbench, or one's own, such as my_suite:SUITE.
-        split: base, novel, cross_object or all.
+        split: base, novel, cross_object, chain, chain_novel (tabletop), long (rlbench) or all.
         tasks: names within the split; all if none is given.
         methods: any of replay, textbook (FPFH, RANSAC and ICP of Open3D, extra baselines), registration,
             learned, routed (learned, and the routing network may go back to a step), paper (the paper's
