@@ -22,10 +22,11 @@ from torch import Tensor, nn
 from imop.baselines.batch import batch_of
 from imop.baselines.measure import measure
 from imop.baselines.samples import Samples
-from imop.baselines.train import descend, read_stores, schedule
+from imop.baselines.train import descend, read_stores
 from imop.baselines.views import ViewsNetwork
 from imop.baselines.weights import fast_products, load_network, save_network
 from imop.errors import ImopError, InvalidInput
+from imop.networks.descent import schedule
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
-from imop.baselines.samples import Samples, UnsignedArray
+from imop.baselines.samples import Samples, metres
 from imop.types import Float32Array
 
 SHIFT, TURN = 0.125, np.pi / 4
@@ -55,7 +55,7 @@ class Targets:
 def inputs_of(seen: dict[str, Any], words: NDArray[np.int64]) -> Inputs:
     """One state, see `samples.seen`, as a batch."""
     rows = {name: np.asarray(value)[None] for name, value in seen.items()}
-    points = _metres(rows.pop("points"))
+    points = metres(rows.pop("points"))
     colors = rows.pop("colors").astype(np.float32) / 255
     return Inputs(**_tensors(Inputs, {**rows, "points": points, "colors": colors, "words": words[None]}))
 
@@ -69,7 +69,7 @@ def batch_of(
         for field in fields(Samples)
         if field.name not in ("episode", "instructions")
     }
-    rows["points"] = _metres(rows["points"])
+    rows["points"] = metres(rows["points"])
     rows["colors"] = rows["colors"].astype(np.float32) / 255
     if rng is not None:
         T = np.stack([random_motion(pose, rng) for pose in rows["pose"]])
@@ -94,10 +94,6 @@ def random_motion(pose: Float32Array, rng: np.random.Generator) -> Float32Array:
     lowest, highest = np.minimum(p, -0.5), np.maximum(p, 0.5)  # a target outside stays where it is
     T[:3, 3] = (p + rng.uniform(-SHIFT, SHIFT, 3)).clip(lowest, highest) - T[:3, :3] @ p
     return T
-
-
-def _metres(points: UnsignedArray) -> Float32Array:
-    return np.asarray(points.astype(np.float32) / (2**16 - 1) - 0.5, dtype=np.float32)
 
 
 def _tensors(kind: type[Inputs] | type[Targets], rows: dict[str, Any]) -> dict[str, Tensor]:

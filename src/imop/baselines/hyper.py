@@ -28,11 +28,12 @@ from torch.nn import functional as F
 
 from imop.baselines.batch import Targets, batch_of
 from imop.baselines.samples import Samples
-from imop.baselines.train import descend, read_stores, schedule
+from imop.baselines.train import descend, read_stores
 from imop.baselines.views import ViewsNetwork
 from imop.baselines.weights import fast_products, load_network, read_weights, save_weights
 from imop.errors import CorruptData, ImopError
 from imop.files import replaced, writable_folder
+from imop.networks.descent import schedule
 
 CHECKPOINT = "checkpoint.pt"
 _ACTION = 11

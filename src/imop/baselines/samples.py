@@ -3,7 +3,7 @@
 Clouds are made once per episode of a store and kept in a small file, so that training decodes no images.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from io import BytesIO
@@ -102,6 +102,11 @@ def thin(cloud: PointCloud, seed: int = 0) -> tuple[UnsignedArray, ByteArray]:
     return steps[order], np.round(colors[chosen][order] * 255).astype(np.uint8)
 
 
+def metres(points: UnsignedArray) -> Float32Array:
+    """Points (..., 3) as `Samples` has them, in its frame."""
+    return np.asarray(points.astype(np.float32) / _STEPS - 0.5, dtype=np.float32)
+
+
 def _along_curve(steps: UnsignedArray) -> NDArray[np.int64]:
     """(N,) place of each cell on a Z-shaped (Morton) curve through space."""
     cells = (steps >> (16 - _BITS)).astype(np.int64)
@@ -171,19 +176,13 @@ def joined(parts: Sequence[Samples]) -> Samples:
     )
 
 
-def stored_samples(
-    store: Path,
-    cache: Path,
-    perception: Perception,
-    done: Callable[[int, int], None] = lambda number, count: None,
-) -> Samples:
+def stored_samples(store: Path, cache: Path, perception: Perception) -> Samples:
     """All samples of a store of demonstrations; what the cache lacks is made and put there.
 
     Args:
         store: as `imop collect` writes it.
         cache: folder with one file per episode, named by its digest; made if missing.
         perception: makes clouds, without the robot.
-        done: told the number of every episode and how many there are.
 
     Raises:
         InvalidInput: if there is no store, or nothing in it.
@@ -198,7 +197,6 @@ def stored_samples(
         if not file.is_file():
             _save(file, samples_of(perception, opened[index]))
         parts.append(_load(file))
-        done(index + 1, count)
     return joined(parts)
 
 

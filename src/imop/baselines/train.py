@@ -4,7 +4,6 @@ python -m imop.baselines.train --network views --stores rlbench.zarr tabletop.za
 """
 
 import json
-import math
 import shlex
 import sys
 import time
@@ -27,6 +26,7 @@ from imop.baselines.weights import Regressor, fast_products, make_network, save_
 from imop.errors import CorruptData, ImopError, InvalidInput
 from imop.files import replaced, writable_folder
 from imop.geometry.perception import Perception
+from imop.networks.descent import kept, schedule
 from imop.robots.panda import panda_self_filter
 
 CHECKPOINT, LOG = "checkpoint.pt", "log.jsonl"
@@ -124,8 +124,7 @@ class TrainState:
 
     def follow(self, decay: float) -> None:
         """Move the average towards the weights."""
-        # The first steps would otherwise weigh as much as the last.
-        keep = min(decay, (1 + self.step) / (10 + self.step))
+        keep = kept(decay, self.step)
         for mean, new in zip(self.average.parameters(), self.network.parameters(), strict=True):
             mean.lerp_(new.detach(), 1 - keep)
 
@@ -202,14 +201,6 @@ def descend(
     torch.stack(list(parts.values())).sum().backward()  # type: ignore[no-untyped-call]
     torch.nn.utils.clip_grad_norm_(trained.parameters(), clip)
     optimizer.step()
-
-
-def schedule(step: int, warm_up: int, steps: int) -> float:
-    """Share of the peak learning rate: linear warm-up, then a cosine down to 1 %."""
-    if step < warm_up:
-        return (step + 1) / warm_up
-    progress = min((step - warm_up) / max(steps - warm_up, 1), 1.0)
-    return 0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * progress))
 
 
 def card_of(config: RegressorConfig, samples: Samples, learnt: int) -> dict[str, Any]:

@@ -9,15 +9,16 @@ from typing import Any
 
 import dacite
 import torch
-from safetensors.torch import load, save
+from safetensors.torch import load
 from torch import Tensor, nn
 
 from imop.baselines.points import PointsConfig, PointsNetwork
 from imop.baselines.views import ViewsConfig, ViewsNetwork
 from imop.errors import AssetMissing, CorruptData, InvalidInput
-from imop.files import read, replaced
+from imop.files import read
+from imop.networks.descent import has_fast_bfloat16
+from imop.networks.model import CARD, WEIGHTS, write_weights
 
-WEIGHTS, CARD = "weights.safetensors", "card.json"
 _KINDS: dict[str, tuple[Any, Any]] = {
     "points": (PointsConfig, PointsNetwork),
     "views": (ViewsConfig, ViewsNetwork),
@@ -55,13 +56,8 @@ def count_parameters(network: nn.Module) -> int:
 
 
 def save_weights(network: nn.Module, folder: Path, card: Mapping[str, Any]) -> None:
-    """Write weights and card, each whole or not at all, the card last; it is joined by the weights' hash."""
-    weights = save({name: tensor.contiguous() for name, tensor in network.state_dict().items()})
-    with replaced(folder / WEIGHTS) as temporary:
-        temporary.write_bytes(weights)
-    known = {"parameters": count_parameters(network), "sha256": hashlib.sha256(weights).hexdigest()}
-    with replaced(folder / CARD) as temporary:
-        temporary.write_text(json.dumps({**card, **known}, indent=1) + "\n")
+    """Write weights and card, which is joined by the number of parameters and the weights' hash."""
+    write_weights(network, folder, {**card, "parameters": count_parameters(network)})
 
 
 def save_network(network: Regressor, folder: Path, card: Mapping[str, Any]) -> None:
@@ -115,8 +111,4 @@ def load_network(folder: Path, kind: str) -> tuple[Regressor, dict[str, Any]]:
 
 def fast_products() -> torch.autocast:
     """Products in bfloat16 where the processor has fast instructions for it; sums stay in float32."""
-    fast = (
-        "AVX512" in torch.backends.cpu.get_cpu_capability()
-        or "AMX" in torch.backends.cpu.get_cpu_capability()
-    )
-    return torch.autocast("cpu", torch.bfloat16, enabled=fast)
+    return torch.autocast("cpu", torch.bfloat16, enabled=has_fast_bfloat16())

@@ -212,8 +212,6 @@ def attempt(
             policy.watch(first)
         else:
             policy = _watched(shown, method, state, weights, focus)
-        if isinstance(policy, OneShotPolicy):
-            policy.recovers = trial.second_try
         result = rollout(env, policy, most_actions(method, first, trial, env.task), point=point)
     except (MissingExtra, AssetMissing):
         raise  # says nothing about the method

@@ -66,6 +66,8 @@ def rollout(
 ) -> Rollout:
     """Act until success, failure or `steps` actions, in an environment that was just reset.
 
+    A one-shot policy recovers where the environment lets it try again.
+
     Args:
         env: the environment.
         policy: has watched its demonstrations.
@@ -75,6 +77,8 @@ def rollout(
         on_action: called before each action is executed.
         point: tells a one-shot policy which thing is meant; by default nobody does.
     """
+    if isinstance(policy, OneShotPolicy):
+        policy.recovers = env.second_try
     policy.reset()
     taken: list[Step] = []
     for number in range(steps):

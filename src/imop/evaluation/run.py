@@ -15,7 +15,6 @@ from imop.evaluation.report import save_json
 from imop.evaluation.rollout import Rollout, rollout
 from imop.evaluation.trials import Trial, most_actions
 from imop.evaluation.video import save_video
-from imop.policy.one_shot import OneShotPolicy
 from imop.sim.cameras import look_at, render_view
 from imop.sim.world import World
 from imop.types import Action, ByteArray, Demonstration, Observation
@@ -59,8 +58,6 @@ def perform(
     """
     env = trial.env()
     policy = make_policy(method, env.world, min_confidence, weights)
-    if isinstance(policy, OneShotPolicy):
-        policy.recovers = trial.second_try
     policy.watch(demonstration if method == "oracle" else demonstration.stripped())
     film = _Film()
     env.on_frame = film if video else None

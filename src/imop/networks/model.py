@@ -98,15 +98,23 @@ def save_model(model: Model, folder: Path, card: Mapping[str, Any]) -> None:
         folder: made if missing.
         card: data, seed, command, metrics, licence; joined by the configuration and the weights' hash.
     """
-    weights = save({name: tensor.contiguous() for name, tensor in model.state_dict().items()})
+    config = asdict(model.config)
+    known = {"version": VERSION, "config": config, "config_sha256": _hash_of(config)}
+    write_weights(model, folder, {**card, **known})
+
+
+def write_weights(network: nn.Module, folder: Path, card: Mapping[str, Any]) -> None:
+    """Write weights.safetensors and card.json, each whole or not at all, the card last.
+
+    Args:
+        network: any.
+        folder: made if missing.
+        card: joined by the weights' hash.
+    """
+    weights = save({name: tensor.contiguous() for name, tensor in network.state_dict().items()})
     with replaced(folder / WEIGHTS) as temporary:
         temporary.write_bytes(weights)
-    known = {
-        "version": VERSION,
-        "sha256": hashlib.sha256(weights).hexdigest(),
-        "config": asdict(model.config),
-        "config_sha256": _hash_of(asdict(model.config)),
-    }
+    known = {"sha256": hashlib.sha256(weights).hexdigest()}
     with replaced(folder / CARD) as temporary:
         temporary.write_text(json.dumps({**card, **known}, indent=2) + "\n")
 

@@ -65,7 +65,6 @@ class OneShotPolicy:
         self._feasible = feasible
         self._demonstrations: list[list[Transition]] = []
         self._prepared: list[list[PreparedStep]] = []
-        self._same_place: list[list[bool]] = []
         self._cameras: set[str] = set()
         self._camera_errors: dict[str, FloatArray] = {}
         self._progress: dict[int, Progress] = {}
@@ -133,9 +132,7 @@ class OneShotPolicy:
         ]
         self._cameras |= set(observations[0].views)
         self._demonstrations.append(steps)
-        prepared = list(self._matcher.prepare(steps))
-        self._prepared.append(prepared)
-        self._same_place.append(same_place(prepared))
+        self._prepared.append(list(self._matcher.prepare(steps)))
         self.router.watch(steps)
 
     def reset(self) -> None:
@@ -205,7 +202,7 @@ class OneShotPolicy:
         """The same, or the step before and its action, if what it acted on is not where it was."""
         number, step = option.demonstration, option.step
         last = self._progress.get(number, BEGINNING).T_last
-        if last is None or not self._same_place[number][step]:
+        if last is None or step == 0 or not same_place(self._prepared[number][step - 1 : step + 1])[1]:
             return option, action
         T_shown = self._demonstrations[number][step].action.T_world_gripper
         if not self._attempts.undone(option, action.T_world_gripper, last @ T_shown):

@@ -78,12 +78,12 @@ class AdvancingRouter:
     """
 
     def __init__(self) -> None:
-        self._demonstrations: list[list[Transition]] = []
+        self._lengths: list[int] = []
         self.reset()
 
     def watch(self, steps: Sequence[Transition]) -> None:
-        """Remember a demonstration."""
-        self._demonstrations.append(list(steps))
+        """Remember how many steps a demonstration has."""
+        self._lengths.append(len(steps))
 
     def reset(self) -> None:
         """Begin with the first step, of any demonstration."""
@@ -93,11 +93,9 @@ class AdvancingRouter:
     def options(self, query: Scene) -> tuple[Option, ...]:
         """The step after the one taken last."""
         if self._last is None:
-            return tuple(Option(number, 0) for number in range(len(self._demonstrations)))
+            return tuple(Option(number, 0) for number in range(len(self._lengths)))
         number, step = self._last
-        steps = self._demonstrations[number]
-        following = min(step + 1, len(steps) - 1)
-        return (Option(number, following),)
+        return (Option(number, min(step + 1, self._lengths[number] - 1)),)
 
     def took(self, demonstration: int, step: int) -> None:
         """The following step is next."""

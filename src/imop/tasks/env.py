@@ -149,7 +149,7 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
     ):
         self.task, self.variation, self.on_frame = task, variation, on_frame
         self._change, self._sense = change, sense
-        self._disturb, self._second_try = disturb, second_try
+        self._disturb, self.second_try = disturb, second_try
         self._disturber: Disturber | None = None
         self._step_limit = step_limit or task.step_limit
         self._world: World | None = None
@@ -234,7 +234,7 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
             info["success"] = self.task.success(self.world)
         except PlanFailed as error:
             info["plan_failed"] = error.reason
-        terminated = info["success"] or ("plan_failed" in info and not self._second_try)
+        terminated = info["success"] or ("plan_failed" in info and not self.second_try)
         return self._observe(steps), float(info["success"]), terminated, steps >= self._step_limit, info
 
     def wait(self) -> bool:

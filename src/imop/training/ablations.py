@@ -14,7 +14,7 @@ import tyro
 from rich.console import Console
 
 from imop.networks.model import BUNDLED
-from imop.training.commands import Stage, quoted, run
+from imop.training.commands import ROUTING, Stage, quoted, run
 
 Row = Literal[
     "small",
@@ -80,7 +80,7 @@ def _routing(config: AblationsConfig, name: str, options: str) -> Stage:
     command = (
         f"{_train(config, name)} --networks routing --routes {_paths(config.routes)} {options}"
         f" --batch 12 --steps {config.routing_steps} --every {config.routing_steps}"
-        " --learning-rate 0.002 --weight-decay 0.05 --ema 0.98 --precision float32"
+        f" {ROUTING}"
     )
     return Stage(name, f"networks/{name}/card.json", command)
 

@@ -16,6 +16,9 @@ from rich.console import Console
 from imop.errors import StageFailed
 from imop.files import replaced
 
+ROUTING = "--learning-rate 0.002 --weight-decay 0.05 --ema 0.98 --precision float32"
+"""Options with which the routing network is trained, wherever it is."""
+
 
 @dataclass(frozen=True)
 class Stage:

@@ -5,7 +5,6 @@ python -m imop.training.loop --out runs/routing --networks routing --routes PATH
 """
 
 import json
-import math
 import os
 import shlex
 import sys
@@ -24,6 +23,7 @@ from torch.optim.swa_utils import AveragedModel
 from imop.errors import CorruptData, InvalidInput
 from imop.extras import extra
 from imop.files import replaced
+from imop.networks.descent import has_fast_bfloat16, kept, schedule
 from imop.networks.model import NETWORKS, Model, ModelConfig, load_model, part_of, save_model
 from imop.training.config import TrainConfig
 from imop.training.data import PairDataset, RouteDataset, loader
@@ -213,18 +213,10 @@ def _step(
 
 
 def _halved(config: TrainConfig, device: torch.device) -> bool:
-    """Whether products are made in bfloat16; a CPU without AVX-512 takes three times as long for them."""
+    """Whether products are made in bfloat16."""
     if config.precision == "auto":
-        return device.type != "cpu" or "AVX512" in torch.backends.cpu.get_cpu_capability()
+        return device.type != "cpu" or has_fast_bfloat16()
     return config.precision == "bfloat16"
-
-
-def schedule(step: int, warm_up: int, steps: int) -> float:
-    """Share of the peak learning rate: linear warm-up, then a cosine down to 1 %."""
-    if step < warm_up:
-        return (step + 1) / warm_up
-    progress = min((step - warm_up) / max(steps - warm_up, 1), 1.0)
-    return 0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * progress))
 
 
 def _report(config: TrainConfig, state: TrainState, recent: list[dict[str, float]]) -> str:
@@ -267,8 +259,7 @@ def _card(config: TrainConfig) -> dict[str, Any]:
 
 def _moving_average(decay: float) -> Callable[..., None]:
     def update(average: list[Tensor], weights: list[Tensor], count: Tensor) -> None:
-        # The first steps would otherwise weigh as much as the last.
-        keep = min(decay, (1 + float(count)) / (10 + float(count)))
+        keep = kept(decay, float(count))
         for mean, new in zip(average, weights, strict=True):
             mean.lerp_(new, 1 - keep)
 

@@ -13,7 +13,7 @@ import tyro
 from rich.console import Console
 
 from imop.networks.model import BUNDLED
-from imop.training.commands import Stage, quoted, run
+from imop.training.commands import ROUTING, Stage, quoted, run
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,7 @@ def stages(config: ProtocolConfig) -> list[Stage]:
             "routing",
             "networks/routing/card.json",
             f"{loop}/routing --networks routing --routes {o}/shards/routes --batch 12"
-            f" --steps {config.routing_steps} --learning-rate 0.002 --weight-decay 0.05 --ema 0.98"
-            " --precision float32 --seed 80",
+            f" --steps {config.routing_steps} {ROUTING} --seed 80",
         ),
         Stage(
             "merged",

@@ -15,7 +15,7 @@ from rich.console import Console
 from imop.errors import InvalidInput
 from imop.files import replaced
 from imop.training.ablation import Ablation
-from imop.training.commands import Stage, run
+from imop.training.commands import ROUTING, Stage, quoted, run
 from imop.training.config import TrainConfig
 
 # What is slow to import is imported where it is needed, for the command line names the recipes.
@@ -125,7 +125,7 @@ def stages(recipe: Recipe, out: Path, jobs: int) -> list[Stage]:
         out: folder of everything; the weights come directly into it.
         jobs: processes. Shards, demonstrations and cases do not depend on them.
     """
-    r, o = recipe, shlex.quote(str(out))
+    r, o = recipe, quoted(out)
     mix, shares = (" ".join(map(str, numbers)) for numbers in (r.mix, r.shares))
     tasks = f" --tasks {shlex.join(r.tasks)}" if r.tasks else ""
     generate = f"-m imop.training.generate --jobs {jobs} --out {o}/shards"
@@ -170,8 +170,7 @@ def stages(recipe: Recipe, out: Path, jobs: int) -> list[Stage]:
             "networks/routing/card.json",
             f"{_loop(r.routing_batch, jobs)} --out {o}/networks/routing --networks routing"
             f" --routes {o}/shards/routes --validate-routes {o}/shards/validation_routes"
-            f" --steps {r.routing_steps} --every {r.every} --learning-rate 0.002 --weight-decay 0.05"
-            f" --ema 0.98 --precision float32 --seed 80",
+            f" --steps {r.routing_steps} --every {r.every} {ROUTING} --seed 80",
         ),
         Stage(
             "merged",
