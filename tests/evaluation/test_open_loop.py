@@ -17,6 +17,7 @@ from imop.geometry.accuracy import COARSE, FINE
 from imop.geometry.perception import Perception
 from imop.policy.interfaces import Candidate
 from imop.policy.one_shot import OneShotPolicy
+from imop.policy.router import Option
 from imop.tasks.env import make_task
 from imop.tasks.expert import record_demonstration
 
@@ -109,8 +110,8 @@ class AlwaysFirst:
     def reset(self):
         self.heard.append("reset")
 
-    def route(self, query):
-        return 0, 0
+    def options(self, query):
+        return (Option(0, 0),)
 
     def took(self, demonstration, step):
         self.heard.append(step)
