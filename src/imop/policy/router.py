@@ -8,6 +8,7 @@ episode says enters as odds:
 - the step after the one taken last: 1;
 - a step before that, since an action can fail: `back`;
 - any step after it, since what a step would do may be done already: `skip`;
+- what was done with something in the hand, if the fingers are closed on nothing: times `lost`;
 - the same in another demonstration than the one followed so far: times `change`, unless that one failed.
 
 The product of odds and the network's probability decides. A step that was taken 1 + `retries` times is only
@@ -27,11 +28,10 @@ from imop.networks.changes import change_graph, compared
 from imop.networks.model import Model
 from imop.networks.routing import Described, States, make_states
 from imop.policy.interfaces import Scene, Transition
-from imop.types import BoolArray, FloatArray, Observation
+from imop.types import BoolArray, FloatArray
 
-# Fingers that are open by less than this share of their stroke hold nothing.
-EMPTY = 0.01
-
+# Fingers that are open by less than this share of their stroke hold nothing; by more, they do if they close.
+EMPTY, HELD = 0.01, 0.02
 
 # Of several demonstrations those are options that are at least so plausible, against the most plausible one.
 PLAUSIBLE = 0.1
@@ -102,7 +102,7 @@ class AdvancingRouter:
         number, step = self._last
         steps = self._demonstrations[number]
         following = min(step + 1, len(steps) - 1)
-        lost = _is_empty(query.observation, steps[following].before.observation)
+        lost = query.observation.gripper_opening < EMPTY and needs_hold(steps)[following]
         return (Option(number, _approach(steps, following) if lost else following),)
 
     def took(self, demonstration: int, step: int) -> None:
@@ -114,9 +114,14 @@ class AdvancingRouter:
         self._last = self._undone
 
 
-def _is_empty(observed: Observation, shown: Observation) -> bool:
-    """Whether the fingers closed on nothing, where they held something when it was shown."""
-    return observed.gripper_opening < EMPTY and shown.gripper_opening > 2 * EMPTY
+def holds(shown: Transition) -> bool:
+    """Whether something is in the hand after a demonstrated step."""
+    return not shown.action.gripper_open and shown.after.observation.gripper_opening > HELD
+
+
+def needs_hold(steps: Sequence[Transition]) -> BoolArray:
+    """(L,) before which steps something is in the hand."""
+    return np.array([False, *(holds(step) for step in steps[:-1])])
 
 
 def _approach(steps: Sequence[Transition], step: int) -> int:
@@ -133,12 +138,14 @@ class Odds:
         back: of a step before.
         skip: of a later step.
         change: of another demonstration than the one followed so far.
+        lost: of a step before which something was in the hand, if the fingers are closed on nothing.
         retries: how often a step may be done again.
     """
 
     back: float = 0.2
     skip: float = 0.01
     change: float = 0.05
+    lost: float = 0.01
     retries: int = 2
 
 
@@ -165,6 +172,7 @@ class LearnedRouter:
     def __init__(self, model: Model, odds: Odds | None = None):
         self._model, self._odds = model, odds or Odds()
         self._shown: list[Described] = []
+        self._needs_hold: list[BoolArray] = []
         self.reset()
 
     def watch(self, steps: Sequence[Transition]) -> None:
@@ -173,11 +181,13 @@ class LearnedRouter:
         with torch.inference_mode():
             described = self._model.routing.describe(self._states(scenes, [scenes[0], *scenes[:-1]]))
         self._shown.append(described)
+        self._needs_hold.append(needs_hold(steps))
 
     def reset(self) -> None:
         """Begin with the first step, of any demonstration."""
         self._last: tuple[int, int] | None = None
         self._asked: Scene | None = None
+        self._first: dict[tuple[int, int], Scene | None] = {}
         self._before: Scene | None = None
         self._undone: tuple[tuple[int, int] | None, Scene | None] = None, None
         self._taken: Counter[tuple[int, int]] = Counter()
@@ -188,6 +198,8 @@ class LearnedRouter:
         scores = self.scores(query)
         chances = [self._prior(len(seen)) * _normalized(seen) for seen in scores]
         for number, chance in enumerate(chances):
+            if query.observation.gripper_opening < EMPTY:
+                chance[self._needs_hold[number]] *= self._odds.lost
             chance[self._worn(number, len(chance))] *= 1e-12
         found = [Option(n, int(chance.argmax()), float(chance.max())) for n, chance in enumerate(chances)]
         return tuple(self._plausible(found))
@@ -207,7 +219,9 @@ class LearnedRouter:
     def took(self, demonstration: int, step: int) -> None:
         """The following step is expected next, and what was asked about last is the state before it."""
         self._undone = self._last, self._before
-        self._last, self._before = (demonstration, step), self._asked
+        self._last = (demonstration, step)
+        # What is done again has the state before it that it had at first: the network knows no other.
+        self._before = self._first.setdefault(self._last, self._asked)
         self._taken[self._last] += 1
 
     def undo(self) -> None:
