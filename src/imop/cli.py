@@ -78,7 +78,7 @@ def run(
         shown: that of the demonstrated objects, if it shall show others of their kind.
         demo: store or folder of RLBench's layout with a demonstration; one is recorded if not given.
         demo_episode: which of its episodes.
-        method: learned, routed, replay, registration, textbook, oracle (true object poses), or one's own,
+        method: learned, advancing, replay, registration, textbook, oracle (true object poses), or one's own,
             such as my_methods:MyPolicy.
         change: what the scene differs in from the demonstrated one, as in `imop eval`.
         disturb: what goes wrong once, as in `imop eval`.
@@ -188,8 +188,9 @@ def evaluate(
         split: base, novel, cross_object or all.
         tasks: names within the split; all if none is given.
         methods: any of replay, textbook (FPFH, RANSAC and ICP of Open3D, extra baselines), registration,
-            learned, routed (learned, and the routing network may go back to a step), oracle (true object
-            poses), expert, or one's own (my_methods:MyPolicy), joined by commas.
+            learned (the routing network may go back to a step), advancing (learned, but steps follow each
+            other as shown), oracle (true object poses), expert, or one's own (my_methods:MyPolicy), joined by
+            commas.
         episodes: scenes per task, spread over its variations.
         seed: first seed of the scenes.
         instance: seed of the demonstrated objects' shapes, sizes and colours.

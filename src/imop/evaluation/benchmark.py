@@ -147,7 +147,7 @@ def tried(
         if method not in ("oracle", "expert"):
             policy = make_policy(method, weights=weights)  # what is missing is said before anything is tried
         if focus and (method in ("oracle", "expert") or not isinstance(policy, OneShotPolicy)):
-            raise InvalidInput("focus", f"{method} takes none", "learned, routed, registration, textbook")
+            raise InvalidInput("focus", f"{method} takes none", "learned, advancing, registration, textbook")
     known = EpisodeLog(log)
     state = cache(lambda task, method: method_state(method, weights, task) + ("-focus" if focus else ""))
     wanted = [(trial, method, state(trial.task, method)) for trial in trials for method in methods]

@@ -83,7 +83,7 @@ def method_state(method: str, weights: Path | None, task: str) -> str:
     if method not in ("expert", "oracle", "replay"):
         deciding = imop.policy, imop.networks, imop.demos, imop.evaluation.textbook
         digests.append(code_digest(*deciding))
-    if method in ("learned", "registration", "routed"):
+    if method in ("learned", "registration", "advancing"):
         digests.append(weights_digest(weights or BUNDLED))
     own = [find_task(task)] + ([] if method in METHODS else [find_method(method)])
     return "-".join([*digests, *own_code_digest(*own)])

@@ -18,7 +18,7 @@ from imop.policy.one_shot import OneShotPolicy
 from imop.policy.registration import RegistrationMatcher
 from imop.types import Action, Demonstration, Observation
 
-METHODS = ("replay", "textbook", "registration", "learned", "routed", "oracle", "expert")
+METHODS = ("replay", "textbook", "registration", "learned", "advancing", "oracle", "expert")
 _OWN = (
     "a class or function that makes, called without arguments, an object with watch, reset and act, named "
     "module:object or by an entry point imop.methods"
@@ -48,7 +48,7 @@ def make_policy(
     """A fresh policy by the name of its method.
 
     Args:
-        method: learned, routed (learned, and the routing network chooses the step), replay, registration,
+        method: learned, advancing (learned, but steps follow each other as shown), replay, registration,
             textbook, oracle, or one's own: "module:object", or an entry point of the group imop.methods. The
             object makes a `Policy` when it is called without arguments.
         world: the simulated world, which only the oracle reads.
@@ -71,9 +71,10 @@ def make_policy(
             RegistrationMatcher.from_pretrained(weights or BUNDLED) if registered else TextbookMatcher()
         )
         return OneShotPolicy(matcher, perception, min_confidence=min_confidence, feasible=reachable)
-    if method in ("learned", "routed"):
+    if method in ("learned", "advancing"):
+        routed = None if method == "learned" else False
         return OneShotPolicy.from_pretrained(
-            weights or BUNDLED, perception, min_confidence, method == "routed", reachable
+            weights or BUNDLED, perception, min_confidence, routed, reachable
         )
     if method == "oracle" and world is not None:
         return OraclePolicy(world)

@@ -247,4 +247,4 @@ def change_notes(trials: Mapping[str, Sequence[Trial]], change: str) -> list[str
 
 def most_actions(method: str, demonstration: Demonstration, trial: Trial, task: Task) -> int:
     """As many as were demonstrated, or as the task allows to those who may try again."""
-    return task.step_limit if method == "routed" or trial.second_try else len(demonstration)
+    return task.step_limit if method == "learned" or trial.second_try else len(demonstration)

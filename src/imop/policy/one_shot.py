@@ -79,7 +79,7 @@ class OneShotPolicy:
         weights: Path = BUNDLED,
         perception: Perception | None = None,
         min_confidence: float = 0.0,
-        routed: bool = False,
+        routed: bool | None = None,
         feasible: Feasible | None = None,
     ) -> "OneShotPolicy":
         """The learned policy.
@@ -89,7 +89,7 @@ class OneShotPolicy:
             perception: makes clouds of observations; by default the robot stays in them.
             min_confidence: below it `act` raises `NoConfidentMatch`.
             routed: whether the routing network chooses the step, so that what failed is repeated; otherwise
-                steps follow each other.
+                steps follow each other. By default it does if it is trained.
             feasible: whether the arm can take the gripper to a pose.
 
         Raises:
@@ -101,7 +101,8 @@ class OneShotPolicy:
             raise CorruptData(
                 weights, "has no trained routing network", "merge one into it (docs/training.md)"
             )
-        router = LearnedRouter(model) if routed else None
+        chosen = model.routing.trained if routed is None else routed
+        router = LearnedRouter(model) if chosen else None
         return cls(LearnedMatcher(model), perception or Perception(), router, min_confidence, feasible)
 
     def watch(self, demonstration: Demonstration, focus: Focus | None = None) -> None:
