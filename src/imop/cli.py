@@ -59,8 +59,8 @@ def run(
         shown: that of the demonstrated objects, if it shall show others of their kind.
         demo: store or folder of RLBench's layout with a demonstration; one is recorded if not given.
         demo_episode: which of its episodes.
-        method: learned, routed, paper, replay, registration, textbook, oracle (true object poses), or one's
-            own, such as my_methods:MyPolicy.
+        method: learned, advancing, paper, replay, registration, textbook, oracle (true object poses), or
+            one's own, such as my_methods:MyPolicy.
         change: what the scene differs in from the demonstrated one, as in `imop eval`.
         disturb: what goes wrong once, as in `imop eval`.
         weights: folder that `imop train` wrote; by default the bundled weights.
@@ -170,10 +170,10 @@ def evaluate(
         split: base, novel, cross_object, chain, chain_novel (tabletop), long (rlbench) or all.
         tasks: names within the split; all if none is given.
         methods: any of replay, textbook (FPFH, RANSAC and ICP of Open3D, extra baselines), registration,
-            learned, routed (learned, and the routing network may go back to a step), paper (the paper's
-            networks and one fit, no search), act3d and rvt (regressors in the manner of these), rvt_ft and
-            rvt_hdt (rvt, fine-tuned on the demonstration of a novel task), oracle (true object poses),
-            expert, or one's own (my_methods:MyPolicy), joined by commas.
+            learned (the routing network may go back to a step), advancing (learned, but steps follow each
+            other as shown), paper (the paper's networks and one fit, no search), act3d and rvt (regressors in
+            the manner of these), rvt_ft and rvt_hdt (rvt, fine-tuned on the demonstration of a novel task),
+            oracle (true object poses), expert, or one's own (my_methods:MyPolicy), joined by commas.
         episodes: scenes per task, spread over its variations.
         seed: first seed of the scenes.
         instance: seed of the demonstrated objects' shapes, sizes and colours.

@@ -276,7 +276,8 @@ def test_routing_needs_a_trained_network(tmp_path):
     assert isinstance(OneShotPolicy.from_pretrained(tmp_path).router, AdvancingRouter)
     model.routing.standardized.batches += 1
     save_model(model, tmp_path, {})
-    assert isinstance(OneShotPolicy.from_pretrained(tmp_path, routed=True).router, LearnedRouter)
+    for routed, kind in ((None, LearnedRouter), (True, LearnedRouter), (False, AdvancingRouter)):
+        assert isinstance(OneShotPolicy.from_pretrained(tmp_path, routed=routed).router, kind)
 
 
 @pytest.mark.parametrize(

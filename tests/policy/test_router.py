@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from imop.geometry import se3
 from imop.networks.graph import GraphConfig
 from imop.networks.model import Model, ModelConfig
-from imop.policy.router import AdvancingRouter, LearnedRouter, Odds, Option, prior
+from imop.policy.router import AdvancingRouter, LearnedRouter, Odds, Option, holds, prior
 from tests.networks.test_routing import ROUTING
 from tests.policy.scenes import BLUE, RED, above, at, box, moved, scene, transitions
 
@@ -77,7 +77,7 @@ class Told(LearnedRouter):
 
     def go(self, *probabilities):
         self.probabilities = probabilities
-        return go(self, None)
+        return go(self)
 
 
 def sure(step, doubt=1e-6):
@@ -119,16 +119,43 @@ def test_what_is_done_already_is_skipped_only_with_certainty():
     assert Told().go(sure(2, 1e-2)) == (0, 0)
 
 
+def test_steps_that_need_what_was_lost_are_out_of_the_question(router):
+    """The network that was not trained says nothing of it."""
+    openings, actions = (1.0, 1.0, 0.4, 0.4, 1.0), (True, False, False, True)
+    states = [scene([], above(0, 0, 1 - 0.05 * k), opening) for k, opening in enumerate(openings)]
+    learned = LearnedRouter(router._model)
+    learned.watch(transitions(states, [(HOME, opened) for opened in actions]))
+    learned.took(0, 1)
+    assert learned.options(states[2])[0].step == 2
+    empty = scene([], states[2].observation.T_world_gripper, 0.0)
+    assert learned.options(empty)[0].step < 2
+
+
+@pytest.mark.parametrize(
+    ("openings", "held"),
+    [
+        ((1.0, 0.4, 0.4, 1.0), [False, True, True, False]),
+        ((1.0, 0.0, 0.0, 1.0), [False, False, False, False]),
+        ((1.0, 0.7, 0.0, 1.0), [False, False, False, False]),  # still closing at the keyframe
+    ],
+)
+def test_what_is_held_is_known_by_the_fingers_before_they_open(openings, held):
+    states = [scene([], HOME, opening) for opening in (1.0, *openings)]
+    steps = transitions(states, [(HOME, opened) for opened in (True, False, False, True)])
+    assert holds(steps).tolist() == held
+    assert holds(steps[:3]).tolist() == held[:3]
+
+
 def test_of_several_demonstrations_one_is_followed_until_it_fails():
     router = Told(sure(0), 3 * sure(0))
-    assert [(o.demonstration, o.step) for o in router.options(None)] == [(0, 0), (1, 0)]
-    assert len({round(o.weight, 6) for o in router.options(None)}) == 1
+    assert [(o.demonstration, o.step) for o in router.options(STATE)] == [(0, 0), (1, 0)]
+    assert len({round(o.weight, 6) for o in router.options(STATE)}) == 1
     router.took(1, 0)
     router.probabilities = sure(1), sure(1)
-    assert [(o.demonstration, o.step) for o in router.options(None)] == [(1, 1)]
+    assert [(o.demonstration, o.step) for o in router.options(STATE)] == [(1, 1)]
     router.took(1, 1)
     router.probabilities = sure(0), sure(0)
-    assert {o.demonstration for o in router.options(None)} == {0, 1}
+    assert {o.demonstration for o in router.options(STATE)} == {0, 1}
 
 
 @given(st.lists(st.integers(0, LENGTH - 1), min_size=1, max_size=40))
@@ -170,6 +197,20 @@ def test_it_knows_what_was_seen_before_the_last_action(router):
         found.append(router.scores(STATES[1])[0])
     router.reset()
     assert all(np.abs(a - b).max() > 1e-4 for a, b in combinations(found, 2))
+
+
+def test_what_is_done_again_has_the_state_before_it_that_it_had_at_first(router):
+    found = []
+    for detour in (False, True):
+        router.reset()
+        router.options(STATES[0])
+        router.took(0, 0)
+        if detour:
+            for state, step in ((STATES[1], 1), (STATES[3], 0)):
+                router.options(state)
+                router.took(0, step)
+        found.append(router.scores(STATES[1])[0])
+    np.testing.assert_array_equal(*found)
 
 
 def test_odds_of_steps():

@@ -168,7 +168,7 @@ def tried(
             # What is missing is said before anything is tried.
             policy = make_policy(method, weights=folders[method])
         if focus and (method in ("oracle", "expert") or not isinstance(policy, OneShotPolicy)):
-            raise InvalidInput("focus", f"{method} takes none", "learned, routed, registration, textbook")
+            raise InvalidInput("focus", f"{method} takes none", "learned, advancing, registration, textbook")
     known = EpisodeLog(log)
     state = cache(
         lambda task, method: method_state(method, folders[method], task) + ("-focus" if focus else "")

@@ -85,7 +85,7 @@ def method_state(method: str, weights: Path | None, task: str) -> str:
     if method not in ("expert", "oracle", "replay"):
         deciding = imop.policy, imop.networks, imop.demos, imop.evaluation.textbook
         digests.append(code_digest(*deciding))
-    if method in ("learned", "registration", "routed", "paper"):
+    if method in ("learned", "registration", "advancing", "paper"):
         digests.append(weights_digest(weights or BUNDLED))
     if method in REGRESSORS:
         digests.append(code_digest(imop.baselines))

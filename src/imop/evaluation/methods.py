@@ -25,7 +25,7 @@ METHODS = (
     "textbook",
     "registration",
     "learned",
-    "routed",
+    "advancing",
     "paper",
     *REGRESSORS,
     "oracle",
@@ -60,7 +60,7 @@ def make_policy(
     """A fresh policy by the name of its method.
 
     Args:
-        method: learned, routed (learned, and the routing network chooses the step), paper (the networks and
+        method: learned, advancing (learned, but steps follow each other as shown), paper (the networks and
             one fit, without search and verification), replay, registration, textbook, oracle, act3d and rvt
             (regressors in the manner of these, which were trained on base tasks), rvt_ft and rvt_hdt (rvt,
             fine-tuned on the demonstration of a novel task), or one's own: "module:object", or an entry point
@@ -86,9 +86,10 @@ def make_policy(
             RegistrationMatcher.from_pretrained(weights or BUNDLED) if registered else TextbookMatcher()
         )
         return OneShotPolicy(matcher, perception, min_confidence=min_confidence, feasible=reachable)
-    if method in ("learned", "routed"):
+    if method in ("learned", "advancing"):
+        routed = None if method == "learned" else False
         return OneShotPolicy.from_pretrained(
-            weights or BUNDLED, perception, min_confidence, method == "routed", reachable
+            weights or BUNDLED, perception, min_confidence, routed, reachable
         )
     if method == "paper":
         return paper_policy(weights or BUNDLED, perception, min_confidence, reachable)

@@ -248,5 +248,5 @@ def change_notes(trials: Mapping[str, Sequence[Trial]], change: str) -> list[str
 
 def most_actions(method: str, demonstration: Demonstration, trial: Trial, task: Task) -> int:
     """As many as were demonstrated, or as the task allows to those who may try again or follow no order."""
-    free = trial.second_try or method in ("routed", "paper", *REGRESSORS)
+    free = trial.second_try or method in ("learned", "paper", *REGRESSORS)
     return task.step_limit if free else len(demonstration)

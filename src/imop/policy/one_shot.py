@@ -24,7 +24,7 @@ from imop.policy.interfaces import (
 )
 from imop.policy.learned import LearnedMatcher
 from imop.policy.recovery import Attempts, same_place
-from imop.policy.router import AdvancingRouter, LearnedRouter, Option, Router
+from imop.policy.router import AdvancingRouter, LearnedRouter, Option, Router, holds
 from imop.types import Action, Demonstration, FloatArray, Match, Observation
 
 # The tip is kept this far above the ground, metres, if it was shown above it. What would be deeper in the
@@ -80,7 +80,7 @@ class OneShotPolicy:
         weights: Path = BUNDLED,
         perception: Perception | None = None,
         min_confidence: float = 0.0,
-        routed: bool = False,
+        routed: bool | None = None,
         feasible: Feasible | None = None,
     ) -> "OneShotPolicy":
         """The learned policy.
@@ -90,7 +90,7 @@ class OneShotPolicy:
             perception: makes clouds of observations; by default the robot stays in them.
             min_confidence: below it `act` raises `NoConfidentMatch`.
             routed: whether the routing network chooses the step, so that what failed is repeated; otherwise
-                steps follow each other.
+                steps follow each other. By default it does if it is trained.
             feasible: whether the arm can take the gripper to a pose.
 
         Raises:
@@ -102,13 +102,15 @@ class OneShotPolicy:
             raise CorruptData(
                 weights, "has no trained routing network", "merge one into it (docs/training.md)"
             )
-        router = LearnedRouter(model) if routed else None
+        chosen = model.routing.trained if routed is None else routed
+        router = LearnedRouter(model) if chosen else None
         return cls(LearnedMatcher(model), perception or Perception(), router, min_confidence, feasible)
 
     def watch(self, demonstration: Demonstration, focus: Focus | None = None) -> None:
         """Take in a demonstration; a further call adds another one.
 
-        Of several, the one is followed whose first step is found again with the highest probability.
+        Of several, the one is followed whose places are all found again: that of which the least probable is
+        the most probable.
 
         Args:
             demonstration: what was shown.
@@ -191,25 +193,41 @@ class OneShotPolicy:
             tried = self._attempts.go_on(option)
             try:
                 progress = replace(progress, tried=tried)
-                found.append((option, self.locate(query, option.step, option.demonstration, progress)))
+                action = self.locate(query, option.step, option.demonstration, progress)
             except NoConfidentMatch as error:
                 failure = error
+                continue
+            # A demonstration that is followed alone need not be weighed.
+            chance = self._weakest(query, option, action) if len(options) > 1 else 1.0
+            found.append((option.weight * chance, option, action))
         if not found:
             raise failure
-        return max(found, key=lambda pair: pair[0].weight * pair[1].confidence)
+        _, option, action = max(found, key=lambda one: one[0])
+        return option, action
+
+    def _weakest(self, query: Scene, option: Option, action: Action) -> float:
+        """The probability of the least probable of all places that a demonstration has yet to come to."""
+        number = option.demonstration
+        places = enumerate(same_place(self._prepared[number]))
+        later = [k for k, same in places if k > option.step and not same]
+        chances = [action.confidence]
+        for step in later:
+            candidates = self._prepared[number][step].locate(query, BEGINNING, self._feasible)
+            chances.append(candidates[0].probability if candidates else 0.0)
+        return min(chances)
 
     def _checked(self, query: Scene, option: Option, action: Action) -> tuple[Option, Action]:
         """The same, or the step before and its action, if what it acted on is not where it was."""
         number, step = option.demonstration, option.step
-        last = self._progress.get(number, BEGINNING).T_last
-        if last is None or step == 0 or not same_place(self._prepared[number][step - 1 : step + 1])[1]:
+        last, steps = self._progress.get(number, BEGINNING).T_last, self._demonstrations[number]
+        same = step > 0 and same_place(self._prepared[number][step - 1 : step + 1])[1]
+        if last is None or not same or holds(steps)[step - 1]:
             return option, action
-        T_shown = self._demonstrations[number][step].action.T_world_gripper
+        T_shown = steps[step].action.T_world_gripper
         if not self._attempts.undone(option, action.T_world_gripper, last @ T_shown):
             return option, action
-        assert action.match is not None
-        progress = Progress(action.match.T_query_support)
-        return replace(option, step=step - 1), self.locate(query, step - 1, number, progress)
+        # Where it is now, nothing that was done before tells.
+        return replace(option, step=step - 1), self.locate(query, step - 1, number)
 
     def see(
         self, observation: Observation, focus: Focus | None = None, earlier: Scene | None = None

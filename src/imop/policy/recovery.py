@@ -6,7 +6,8 @@ been right all the same, so its probability falls by Bayes' rule only.
 
 Two steps that follow each other are often fixed to the same place of what stands there: come near, then
 close. Their motions are one, then. If the second is found elsewhere, the thing was moved or the first was
-wrong, and in either case the first has to be done again.
+wrong, and in either case the first has to be done again. What is in the hand stays in it, so this says
+something only of steps that leave the hand empty.
 """
 
 from collections import defaultdict

@@ -8,6 +8,7 @@ episode says enters as odds:
 - the step after the one taken last: 1;
 - a step before that, since an action can fail: `back`;
 - any step after it, since what a step would do may be done already: `skip`;
+- what was done with something in the hand, if the fingers are closed on nothing: times `lost`;
 - the same in another demonstration than the one followed so far: times `change`, unless that one failed.
 
 The product of odds and the network's probability decides. A step that was taken 1 + `retries` times is only
@@ -28,6 +29,9 @@ from imop.networks.model import Model
 from imop.networks.routing import Described, States, make_states
 from imop.policy.interfaces import Scene, Transition
 from imop.types import BoolArray, FloatArray
+
+# Fingers that are open by less than this share of their stroke hold nothing; by more, they do if they close.
+EMPTY, HELD = 0.01, 0.02
 
 # Of several demonstrations those are options that are at least so plausible, against the most plausible one.
 PLAUSIBLE = 0.1
@@ -106,6 +110,19 @@ class AdvancingRouter:
         self._last = self._undone
 
 
+def holds(steps: Sequence[Transition]) -> BoolArray:
+    """(L,) whether something is in the hand after each demonstrated step.
+
+    The state before the hand opens again tells it, since fingers may still be closing at a keyframe.
+    """
+    held, opening = np.zeros(len(steps), dtype=bool), 0.0
+    for k in reversed(range(len(steps))):
+        last = k + 1 == len(steps) or steps[k + 1].action.gripper_open
+        opening = steps[k].after.observation.gripper_opening if last else opening
+        held[k] = not steps[k].action.gripper_open and opening > HELD
+    return held
+
+
 @dataclass(frozen=True)
 class Odds:
     """How likely the steps are before anything is seen, against the expected one.
@@ -114,12 +131,14 @@ class Odds:
         back: of a step before.
         skip: of a later step.
         change: of another demonstration than the one followed so far.
+        lost: of a step before which something was in the hand, if the fingers are closed on nothing.
         retries: how often a step may be done again.
     """
 
     back: float = 0.2
     skip: float = 0.01
     change: float = 0.05
+    lost: float = 0.01
     retries: int = 2
 
 
@@ -146,6 +165,7 @@ class LearnedRouter:
     def __init__(self, model: Model, odds: Odds | None = None):
         self._model, self._odds = model, odds or Odds()
         self._shown: list[Described] = []
+        self._needs_hold: list[BoolArray] = []  # before which steps something is in the hand
         self.reset()
 
     def watch(self, steps: Sequence[Transition]) -> None:
@@ -154,11 +174,13 @@ class LearnedRouter:
         with torch.inference_mode():
             described = self._model.routing.describe(self._states(scenes, [scenes[0], *scenes[:-1]]))
         self._shown.append(described)
+        self._needs_hold.append(np.r_[False, holds(steps)[:-1]])
 
     def reset(self) -> None:
         """Begin with the first step, of any demonstration."""
         self._last: tuple[int, int] | None = None
         self._asked: Scene | None = None
+        self._first: dict[tuple[int, int], Scene | None] = {}
         self._before: Scene | None = None
         self._undone: tuple[tuple[int, int] | None, Scene | None] = None, None
         self._taken: Counter[tuple[int, int]] = Counter()
@@ -169,6 +191,8 @@ class LearnedRouter:
         scores = self.scores(query)
         chances = [self._prior(len(seen)) * _normalized(seen) for seen in scores]
         for number, chance in enumerate(chances):
+            if query.observation.gripper_opening < EMPTY:
+                chance[self._needs_hold[number]] *= self._odds.lost
             chance[self._worn(number, len(chance))] *= 1e-12
         found = [Option(n, int(chance.argmax()), float(chance.max())) for n, chance in enumerate(chances)]
         return tuple(self._plausible(found))
@@ -188,7 +212,9 @@ class LearnedRouter:
     def took(self, demonstration: int, step: int) -> None:
         """The following step is expected next, and what was asked about last is the state before it."""
         self._undone = self._last, self._before
-        self._last, self._before = (demonstration, step), self._asked
+        self._last = (demonstration, step)
+        # What is done again has the state before it that it had at first: the network knows no other.
+        self._before = self._first.setdefault(self._last, self._asked)
         self._taken[self._last] += 1
 
     def undo(self) -> None:

@@ -15,7 +15,7 @@ from imop.baselines.policy import FOLDER, PARTS
 from imop.evaluation.fingerprint import code_digest
 from imop.networks.model import BUNDLED, WEIGHTS
 
-_TRAINED = ("learned", "routed", "paper")
+_TRAINED = ("learned", "advancing", "paper")
 
 
 @cache

@@ -162,17 +162,17 @@ REAL_ROBOT = Table(
     ),
 )
 
-_ROUTED = Row("routed", "routed")
+ADVANCING = Row("advancing", "advancing")
 _DISTURBANCES = ("moved", "knocked", "missed", "shut")
 
 
 def _disturbed_rows() -> tuple[Row, ...]:
     disturbed = [
-        Row(f"{row.label}, {what}", row.method, against=row.label, disturb=what, quick=row is _ROUTED)
-        for row in (LEARNED, _ROUTED, PAPER)
+        Row(f"{row.label}, {what}", row.method, against=row.label, disturb=what, quick=row is LEARNED)
+        for row in (LEARNED, ADVANCING)
         for what in _DISTURBANCES
     ]
-    return (LEARNED, _ROUTED, PAPER, *disturbed)
+    return (LEARNED, ADVANCING, *disturbed)
 
 
 DISTURBED = Table(
@@ -188,21 +188,19 @@ DISTURBED = Table(
         "is pushed back.",
         "A disturbed row is compared with the same method undisturbed in the same scenes. Tasks and scenes "
         "in which the disturbance did not happen do not count.",
+        "`advancing` is `learned` without the routing network: steps follow each other as shown.",
         "Not in the paper, whose policy cannot recover (its section on underperformed tasks).",
     ),
     columns=("kept",),
 )
 
-_THREE = tuple(
-    Row(f"{row.label}, three demonstrations", row.method, against=row.label, demonstrations=3)
-    for row in (LEARNED, _ROUTED)
-)
+_THREE = Row("learned, three demonstrations", "learned", against="learned", demonstrations=3)
 DEMONSTRATIONS = Table(
     "demonstrations",
     "One demonstration against three, other objects",
     (
-        SuiteSection("Tabletop, base tasks", (LEARNED, _ROUTED, *_THREE), (), "tabletop", "base", "other"),
-        SuiteSection("Tabletop, novel tasks", (LEARNED, _ROUTED, *_THREE), (), "tabletop", "novel", "other"),
+        SuiteSection("Tabletop, base tasks", (LEARNED, _THREE), (), "tabletop", "base", "other"),
+        SuiteSection("Tabletop, novel tasks", (LEARNED, _THREE), (), "tabletop", "novel", "other"),
     ),
     (
         "Every scene shows other objects of the demonstrated kind; three demonstrations show three "
@@ -211,7 +209,7 @@ DEMONSTRATIONS = Table(
     ),
 )
 
-_LONG_ROWS = (LEARNED, _ROUTED, PAPER)
+_LONG_ROWS = (LEARNED, ADVANCING, PAPER)
 LONG = Table(
     "long",
     "Long tasks, one demonstration of the whole",

@@ -4,7 +4,7 @@ Which thing it is the disturber reads from the simulation and the expert's waypo
 """
 
 import zlib
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
 
 import mujoco
@@ -14,7 +14,7 @@ from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.sim.gripper import OnFrame, release
 from imop.sim.world import World
-from imop.tasks.checks import at_rest, reachable
+from imop.tasks.checks import reachable
 from imop.tasks.clear import GROUND, geoms_of, is_clear
 from imop.tasks.layout import Area, NoRoom
 from imop.tasks.task import Task
@@ -33,7 +33,7 @@ _REACH = {"moved": (0.1, 0.1), "knocked": (0.1, 0.12), "missed": (0.03, 0.07)}
 _MOVED = {int(mujoco.mjtJoint.mjJNT_SLIDE): 0.03, int(mujoco.mjtJoint.mjJNT_HINGE): 0.3}
 """A joint that went this far was opened, metres or radians."""
 _TABLE = Area((-0.1, 0.55), (-0.42, 0.42))
-_CLEARANCE, _DEPTH = 0.005, 0.003
+_CLEARANCE, _DEPTH, _STAYS = 0.005, 0.003, (0.004, 0.05)
 _TRIES, _SETTLE_STEPS, _FAR = 60, 200, 1.0
 
 
@@ -102,7 +102,8 @@ class Disturber:
             if not is_clear(world, own, others, _CLEARANCE):
                 continue
             world.step(_SETTLE_STEPS)
-            if at_rest(world, there) and self._within_reach(world, whole):
+            stays = all(se3.near(world.pose(name), T, *_STAYS) for name, T in there.items())
+            if stays and self._within_reach(world, whole):
                 return True
         raise NoRoom(f"{names[0]}: no free place beside in {_TRIES} tries")
 
@@ -175,14 +176,22 @@ def _is_free(world: World, body: str) -> bool:
 
 def _openable(world: World) -> dict[str, float]:
     """Hinges and slides of things that nothing drives back, and where they are now."""
-    m, arm = world.model, world.robot_bodies
-    solid = set(m.geom_bodyid[(m.geom_contype != 0) | (m.geom_conaffinity != 0)].tolist())
+    m = world.model
+    solid = m.geom_bodyid[(m.geom_contype != 0) | (m.geom_conaffinity != 0)].tolist()
+    bearing = {carrier for body in set(solid) for carrier in _carriers(world, body)} - world.robot_bodies
     joints = [
         m.joint(j).name
         for j in range(m.njnt)
-        if int(m.jnt_type[j]) in _MOVED and m.jnt_stiffness[j] == 0 and int(m.jnt_bodyid[j]) in solid - arm
+        if int(m.jnt_type[j]) in _MOVED and m.jnt_stiffness[j] == 0 and int(m.jnt_bodyid[j]) in bearing
     ]
     return {name: world.joint(name) for name in joints}
+
+
+def _carriers(world: World, body: int) -> Iterator[int]:
+    """A body, what carries it, and so on."""
+    while body:
+        yield body
+        body = int(world.model.body_parentid[body])
 
 
 def _touching(world: World, thing: int) -> set[int]:
@@ -222,7 +231,8 @@ def _above_table(world: World, geoms: Collection[int]) -> float:
     top = np.flatnonzero(m.geom_bodyid == m.body("table").id)
     solid = [g for g in geoms if m.geom_contype[g] or m.geom_conaffinity[g]]
     pairs = ((int(g), int(t)) for g in solid for t in top)
-    return float(max(min(mujoco.mj_geomDistance(m, world.data, *pair, _FAR, None) for pair in pairs), 0.0))
+    distances = (mujoco.mj_geomDistance(m, world.data, *pair, _FAR, None) for pair in pairs)
+    return float(max(min(distances, default=0.0), 0.0))
 
 
 def _hits_robot(world: World) -> bool:
