@@ -19,7 +19,7 @@ demo: install
 	$(BIN)/imop run --task tabletop/lid_off_pot --seed 1 --out runs/demo
 
 test: install lint
-	$(BIN)/pytest -n 2 --dist loadfile
+	$(BIN)/pytest -n 2 --dist worksteal
 
 lint: install
 	$(BIN)/ruff check .
@@ -42,7 +42,7 @@ test-lowest: install
 	$(BIN)/python -m venv --clear build/lowest
 	build/lowest/bin/pip install --quiet --disable-pip-version-check -c build/lowest.txt -e '.[sim,viz,train]' \
 		hypothesis pytest pytest-xdist
-	build/lowest/bin/python -m pytest -n 2 --dist loadfile tests/demos tests/geometry tests/networks tests/policy \
+	build/lowest/bin/python -m pytest -n 2 --dist worksteal tests/demos tests/geometry tests/networks tests/policy \
 		tests/robots tests/sim tests/evaluation tests/tasks/coppelia tests/tasks/test_env.py tests/test_cli.py \
 		tests/training/test_loop.py tests/training/test_ablation.py tests/training/test_routes.py
 

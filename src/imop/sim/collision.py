@@ -127,8 +127,9 @@ class _HeldBodies:
     def move(self, data: Any, T_world_hand: FloatArray) -> None:
         """Write the free joints for a pose of the hand."""
         for start, T_hand_body in self.free_qpos:
-            pose = se3.to_pose7(T_world_hand @ T_hand_body)
-            data.qpos[start : start + 7] = pose[[0, 1, 2, 6, 3, 4, 5]]
+            T = T_world_hand @ T_hand_body
+            data.qpos[start : start + 3] = T[:3, 3]
+            mujoco.mju_mat2Quat(data.qpos[start + 3 : start + 7], T[:3, :3].ravel())
 
 
 def densify(q: FloatArray, resolution: float) -> FloatArray:

@@ -205,6 +205,15 @@ class Shape(SceneObject):
         parts = [se3.apply(p.T_shape_mesh, p.vertices[p.triangles].astype(np.float64)) for p in self.pieces]
         return np.concatenate(parts) if parts else np.zeros((0, 3, 3))
 
+    @cached_property
+    def ball(self) -> tuple[FloatArray, float]:
+        """Center (3,) in the shape's frame and radius of a ball that all corners lie in."""
+        points = self.corners.reshape(-1, 3)
+        if len(points) == 0:
+            return np.zeros(3), 0.0
+        center: FloatArray = (points.min(axis=0) + points.max(axis=0)) / 2
+        return center, float(np.linalg.norm(points - center, axis=1).max())
+
 
 @dataclass(frozen=True, eq=False)
 class Model:

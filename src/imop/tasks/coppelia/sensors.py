@@ -4,7 +4,7 @@ A solid that encloses the whole volume is not detected, as in the program: surfa
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -31,6 +31,11 @@ class Volume:
         return np.concatenate([self.near, self.far])
 
     @cached_property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Least and largest coordinates of the corners, (3,) each."""
+        return self.corners.min(axis=0), self.corners.max(axis=0)
+
+    @cached_property
     def edges(self) -> FloatArray:
         """(e, 3) directions of the edges, each once."""
         around = [np.roll(ring, -1, axis=0) - ring for ring in (self.near, self.far)]
@@ -52,6 +57,7 @@ def _directions(vectors: FloatArray) -> FloatArray:
     return unique
 
 
+@cache
 def volume(sensor: ProximitySensor) -> Volume:
     """What a sensor looks into."""
     if sensor.kind == "pyramid":
@@ -66,7 +72,7 @@ def volume(sensor: ProximitySensor) -> Volume:
 
 def intersects(volume: Volume, triangles: FloatArray) -> BoolArray:
     """(t,) whether each triangle (t, 3, 3), in the volume's frame, meets it: no plane separates the two."""
-    low, high = volume.corners.min(axis=0), volume.corners.max(axis=0)
+    low, high = volume.bounds
     meets: BoolArray = np.all((triangles.min(axis=1) <= high) & (triangles.max(axis=1) >= low), axis=1)
     near = np.flatnonzero(meets)
     if len(near) == 0:
@@ -94,8 +100,13 @@ def detects(world: World, model: Model, sensor: str, name: str, prefix: str = ""
         raise InvalidInput("sensor", sensor, "the name of a proximity sensor")
     if not isinstance(target, Shape | Dummy):
         raise InvalidInput("name", f"{name} is neither", "the name of a shape or a dummy")
-    corners = target.corners if isinstance(target, Shape) else np.zeros((1, 3, 3))
     T_sensor_target = se3.invert(world.pose(prefix + sensor)) @ world.pose(prefix + name)
+    center, radius = target.ball if isinstance(target, Shape) else (np.zeros(3), 0.0)
+    low, high = volume(detector).bounds
+    p_center = se3.apply(T_sensor_target, center[None])[0]
+    if np.any((p_center < low - radius) | (p_center > high + radius)):
+        return False
+    corners = target.corners if isinstance(target, Shape) else np.zeros((1, 3, 3))
     triangles = se3.apply(T_sensor_target, corners.reshape(-1, 3)).reshape(-1, 3, 3)
     if isinstance(target, Shape) and not (detector.front_faces and detector.back_faces):
         normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
