@@ -4,7 +4,7 @@ A solid that encloses the whole volume is not detected, as in the program: surfa
 """
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -57,7 +57,7 @@ def _directions(vectors: FloatArray) -> FloatArray:
     return unique
 
 
-@cache
+@lru_cache(maxsize=64)  # resized models have sensors of their own in every scene
 def volume(sensor: ProximitySensor) -> Volume:
     """What a sensor looks into."""
     if sensor.kind == "pyramid":
