@@ -25,9 +25,10 @@ from imop.types import FloatArray, Observation
 
 # An arm that is farther than this from where it was sent, metres and radians, was not moved there.
 ARRIVED = (0.02, np.radians(10.0))
-# Regions that have more than this share in common are the same.
+# Regions that have more than this share in common are the same; not tuned.
 SAME_PLACE = 0.5
-# How often what is right fails all the same: the thing slips, or somebody moves it.
+# How often what is right fails all the same: the thing slips, or somebody moves it. A guess, about
+# as often as the oracle fails; not tuned.
 BAD_LUCK = 0.1
 
 
