@@ -102,11 +102,12 @@ def test_another_candidate_can_be_taken_instead_and_the_episode_goes_on_from_it(
 
 
 def test_what_was_shown_can_be_looked_at(policy, shown):
-    step, prepared = policy.shown(1)
+    step, prepared = policy.steps()[1]
+    assert len(policy.steps()) == len(shown)
     assert np.array_equal(step.action.T_world_gripper, shown.keyframes[1].action.T_world_gripper)
     assert nearest(prepared.region, step.before.fused.points)[0].max() < 1e-9
-    with pytest.raises(InvalidInput, match="step"):
-        policy.shown(len(shown))
+    with pytest.raises(InvalidInput, match="demonstration"):
+        policy.steps(1)
 
 
 def test_matched_points_lie_in_the_scene_and_move_rigidly(policy, shown, wanted):

@@ -314,18 +314,16 @@ class OneShotPolicy:
         """
         return self._decision(query, Option(demonstration, step), progress).action
 
-    def shown(self, step: int, demonstration: int = 0) -> tuple[Transition, PreparedStep]:
-        """A demonstrated step as it is worked with, and what was found of it, to look at.
+    def steps(self, demonstration: int = 0) -> tuple[tuple[Transition, PreparedStep], ...]:
+        """The steps of a demonstration as they are worked with, and what was found of each, to look at.
 
         Raises:
-            InvalidInput: if there is no such step.
+            InvalidInput: if no demonstration of that number was watched.
         """
-        of_all = self._demonstrations
-        if not (0 <= demonstration < len(of_all) and 0 <= step < len(of_all[demonstration])):
-            lengths = ", ".join(f"{k}: {len(steps)}" for k, steps in enumerate(of_all))
-            given = f"step {step} of demonstration {demonstration}"
-            raise InvalidInput("step", given, f"demonstrations and their numbers of steps are {lengths}")
-        return of_all[demonstration][step], self._prepared[demonstration][step]
+        if not 0 <= demonstration < len(self._demonstrations):
+            watched = f"a number below {len(self._demonstrations)}, for so many were watched"
+            raise InvalidInput("demonstration", f"{demonstration}", watched)
+        return tuple(zip(self._demonstrations[demonstration], self._prepared[demonstration], strict=True))
 
     def _decision(self, query: Scene, option: Option, progress: Progress) -> Decision:
         """For a step, by its likeliest candidate.

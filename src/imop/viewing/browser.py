@@ -1,4 +1,4 @@
-"""A headless Chromium that is told what to do over its debugging protocol: pictures, clicks, what it shows."""
+"""A headless Chromium, driven over its debugging protocol: pictures, clicks, and what a page shows."""
 
 import base64
 import itertools
@@ -147,3 +147,33 @@ class Browser:
                     return str(pages[0]["webSocketDebuggerUrl"])
             time.sleep(0.1)
         raise InvalidInput("browser", "Chromium did not start", "a Chromium that starts with --headless")
+
+
+# What software rendering makes the page say, which belongs in no picture.
+_NO_NOTICES = "document.querySelectorAll('.mantine-Notification-root').forEach(it => it.remove())"
+
+
+def picture(url: str, size: tuple[int, int], seconds: float = 120.0) -> bytes:
+    """A PNG of a page of ours, as soon as it no longer changes.
+
+    Args:
+        url: of the page.
+        size: width and height, pixels.
+        seconds: how long it may take.
+
+    Raises:
+        InvalidInput: if there is no Chromium, or the page does not come to rest.
+    """
+    with Browser(url, size) as browser:
+        browser.wait("!!document.querySelector('canvas') && document.body.innerText.includes('candidate')")
+        deadline, before = time.monotonic() + seconds, b""
+        while time.monotonic() < deadline:
+            time.sleep(1.0)
+            browser.evaluate(_NO_NOTICES)
+            now = browser.screenshot()
+            if now == before:
+                return now
+            before = now
+    raise InvalidInput(
+        "picture", f"the page still changes after {seconds:.0f} s", "a page that comes to rest"
+    )
