@@ -37,6 +37,7 @@ ALLOWED = {
     },
 }
 ALLOWED["terminal"] = set()
+ALLOWED["viewing"] = ALLOWED["evaluation"] | {"evaluation", "terminal"}
 ALLOWED["reproduce"] = ALLOWED["evaluation"] | {"evaluation", "terminal"}
 
 

@@ -29,6 +29,7 @@ VERBS = (
     "assets",
     "train",
     "model",
+    "view",
 )
 POT = "tabletop/lid_off_pot"
 

@@ -35,6 +35,8 @@ _OPTIONS = (
     "--remote-debugging-port=0",
 )
 
+_KEYS = {"ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40}
+
 
 def find_chromium() -> str | None:
     """Path of the browser; None if none is installed."""
@@ -46,7 +48,7 @@ class Browser:
 
     Args:
         url: of the page.
-        size: width and height of the window, pixels.
+        size: width and height of the page, pixels.
         seconds: how long the browser may take to start, and to answer.
 
     Raises:
@@ -56,7 +58,7 @@ class Browser:
     def __init__(self, url: str, size: tuple[int, int] = (1400, 800), seconds: float = 60.0) -> None:
         program = find_chromium()
         if program is None:
-            raise InvalidInput("browser", "no Chromium was found", f"one of {', '.join(PROGRAMS)} installed")
+            raise InvalidInput("browser", "no Chromium was found", f"{' or '.join(PROGRAMS)}, installed")
         self._seconds, self._numbers = seconds, itertools.count(1)
         self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         own = [f"--user-data-dir={self._folder.name}", f"--window-size={size[0]},{size[1]}"]
@@ -67,6 +69,9 @@ class Browser:
         )
         try:
             self._socket = connect(self._page(), max_size=None)
+            # The window's own size counts what a headless browser does not have around its page.
+            page = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False}
+            self._ask("Emulation.setDeviceMetricsOverride", **page)
         except BaseException:
             self.close()
             raise
@@ -120,6 +125,12 @@ class Browser:
         for kind in ("mousePressed", "mouseReleased"):
             self._ask("Input.dispatchMouseEvent", type=kind, button="left", clickCount=1, **place)
 
+    def key(self, name: str) -> None:
+        """Press and release a key, by the name that browsers give it, such as ArrowLeft."""
+        code = _KEYS.get(name, 0)
+        for kind in ("rawKeyDown", "keyUp"):
+            self._ask("Input.dispatchKeyEvent", type=kind, key=name, code=name, windowsVirtualKeyCode=code)
+
     def screenshot(self) -> bytes:
         """The page as it looks now, a PNG."""
         return base64.b64decode(self._ask("Page.captureScreenshot", format="png")["data"])
@@ -153,8 +164,8 @@ class Browser:
 _NO_NOTICES = "document.querySelectorAll('.mantine-Notification-root').forEach(it => it.remove())"
 
 
-def picture(url: str, size: tuple[int, int], seconds: float = 120.0) -> bytes:
-    """A PNG of a page of ours, as soon as it no longer changes.
+def picture(url: str, size: tuple[int, int], seconds: float = 300.0) -> bytes:
+    """A PNG of the page of a `Window`, as soon as it no longer changes.
 
     Args:
         url: of the page.
@@ -165,8 +176,9 @@ def picture(url: str, size: tuple[int, int], seconds: float = 120.0) -> bytes:
         InvalidInput: if there is no Chromium, or the page does not come to rest.
     """
     with Browser(url, size) as browser:
-        browser.wait("!!document.querySelector('canvas') && document.body.innerText.includes('candidate')")
         deadline, before = time.monotonic() + seconds, b""
+        browser.wait("!!document.querySelector('canvas')", seconds)
+        browser.wait("document.body.innerText.includes('candidate')", seconds)
         while time.monotonic() < deadline:
             time.sleep(1.0)
             browser.evaluate(_NO_NOTICES)
@@ -174,6 +186,4 @@ def picture(url: str, size: tuple[int, int], seconds: float = 120.0) -> bytes:
             if now == before:
                 return now
             before = now
-    raise InvalidInput(
-        "picture", f"the page still changes after {seconds:.0f} s", "a page that comes to rest"
-    )
+    raise InvalidInput("picture", f"still changes after {seconds:.0f} s", "a page that comes to rest")

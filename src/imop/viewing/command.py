@@ -28,15 +28,16 @@ def view(
     method: str = "learned",
     weights: Path | None = None,
     base: tuple[float, float, float] | None = None,
+    robot: str = "panda",
     host: str = "127.0.0.1",
     port: int = 8080,
     ahead: int | None = None,
     screenshot: Path | None = None,
 ) -> int:
-    """Show in a browser what the policy understood: demonstration beside scene, region, matches, candidates.
+    """Show in a browser what the policy understood: region, matches, candidates, predicted gripper, path.
 
-    Look at a recording (--demo and --scene), at a result.json of `imop run` or `imop predict` (--result), or at
-    the simulator (--task), where a button performs what is shown. Needs the extra view; --task the extra sim.
+    Of a recording (--demo and --scene), of a result.json of `imop run` or `imop predict` (--result), or live
+    on the simulator (--task), where a button performs what is shown. Needs the extra view; a task sim, too.
 
     Args:
         task: suite and name of a task to perform on the simulator, such as tabletop/lid_off_pot.
@@ -52,6 +53,7 @@ def view(
         method: as in `imop run`.
         weights: folder that `imop train` wrote; by default the bundled weights.
         base: where the robot's base is in the recordings' frame, metres, as in `imop predict`.
+        robot: whose points are left out and which poses are reached, as in `imop predict`.
         host: address to listen on; by default only this machine can look.
         port: of the page.
         ahead: so many decisions are accepted before anything is shown; all of a result if not given, and none
@@ -63,13 +65,11 @@ def view(
     from imop.viewing.session import Session
     from imop.viewing.window import Window
 
-    chosen = [
-        name for name, given in (("task", task), ("scene", scene), ("result", result)) if given is not None
-    ]
+    sources = {"task": task, "scene": scene, "result": result}
+    chosen = [name for name, given in sources.items() if given is not None]
     if len(chosen) != 1:
-        raise InvalidInput(
-            "view", f"{' and '.join(chosen) or 'nothing'} given", "one of task, scene and result"
-        )
+        problem = f"{' and '.join(chosen) or 'nothing'} given"
+        raise InvalidInput("view", problem, "one of task, scene and result")
     case: Case
     with status("reading, watching and deciding"):
         if result is not None:

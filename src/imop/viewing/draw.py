@@ -8,7 +8,7 @@ import numpy as np
 from imop.geometry import se3
 from imop.geometry.cloud import PointCloud
 from imop.geometry.neighbours import nearest, within
-from imop.types import Action, FloatArray
+from imop.types import Action, BoolArray, FloatArray
 from imop.viewing.drawables import Color, Drawable, Gripper, Label, Lines, Path, Points
 from imop.viewing.look import Look, Shown
 
@@ -20,12 +20,17 @@ POINT, MARKED = 0.006, 0.0075
 MOST_LINES = 40
 # What the region was carried to is marked where something is seen so near to it, metres.
 FOUND = 0.01
-SMALLEST, LARGEST = 0.001, 0.05
+SMALLEST, LARGEST = 0.002, 0.03
 """Spreads at the ends of the scale of colours, metres."""
-# From what is invariant to what is not, dark to light, legible without red and green.
-SCALE = np.array(
-    [[0.27, 0.0, 0.33], [0.23, 0.32, 0.55], [0.13, 0.57, 0.55], [0.37, 0.79, 0.38], [0.99, 0.91, 0.14]]
+_DARK, _BLUE, _TEAL, _GREEN, _YELLOW = (
+    (0.27, 0.0, 0.33),
+    (0.23, 0.32, 0.55),
+    (0.13, 0.57, 0.55),
+    (0.37, 0.79, 0.38),
+    (0.99, 0.91, 0.14),
 )
+SCALE = np.array([_DARK, _BLUE, _TEAL, _GREEN, _YELLOW])
+"""(K, 3) colours from what is invariant to what is not, which differ in brightness too."""
 REGION: Color = (0.07, 0.63, 0.31)
 MATCH: Color = (0.84, 0.15, 0.16)
 PREDICTED: Color = (0.12, 0.25, 0.85)
@@ -33,6 +38,8 @@ OTHER: Color = (0.55, 0.62, 0.9)
 NOW: Color = (0.35, 0.35, 0.35)
 KNOWN: Color = (0.0, 0.6, 0.2)
 MEANT: Color = (0.95, 0.2, 0.75)
+# Words that are nearer to each other than this are read as one, metres.
+ONE_PLACE = 0.06
 # How much of a scene's colours is left, so that what is marked stands out.
 FADED = 0.75
 
@@ -52,7 +59,7 @@ def draw(look: Look) -> list[Drawable]:
 
 
 def spread_colors(spread: FloatArray) -> FloatArray:
-    """(M, 3) colours of spreads (M,), metres: from what is invariant to what is not, on a logarithmic scale."""
+    """(M, 3) colours of spreads (M,), metres, on a logarithmic scale."""
     share = np.log(np.clip(spread, SMALLEST, LARGEST) / SMALLEST) / np.log(LARGEST / SMALLEST)
     at = np.linspace(0, 1, len(SCALE))
     return np.stack([np.interp(share, at, column) for column in SCALE.T], axis=1)
@@ -105,15 +112,21 @@ def _scene(look: Look) -> list[Drawable]:
 
 
 def _others(look: Look) -> list[Drawable]:
-    """The choices that are not looked at, with their probabilities."""
+    """All choices with their probabilities; those in one place share their words."""
     shapes: list[Drawable] = []
+    places: list[tuple[FloatArray, list[str]]] = []
     for number, action in enumerate(look.choices):
         if number != look.chosen:
-            name = f"scene/others/{number}"
-            shapes.append(_gripper(name, action, OTHER, np.zeros(3), 2.0))
-            p_hand = se3.apply(action.T_world_gripper, np.array([[0.0, 0.0, -0.12]]))[0]
-            shapes.append(Label(f"{name}/label", f"{number + 1}: {action.confidence:.0%}", p_hand, 0.8))
-    return shapes
+            shapes.append(_gripper(f"scene/others/{number}", action, OTHER, np.zeros(3), 2.0))
+        p_hand = se3.apply(action.T_world_gripper, np.array([[0.0, 0.0, -0.12]]))[0]
+        words = f"{number + 1}: {action.confidence:.0%}"
+        near = (said for p, said in places if np.linalg.norm(p - p_hand) < ONE_PLACE)
+        if said := next(near, None):
+            said.append(words)
+        else:
+            places.append((p_hand, [words]))
+    labels = [Label(f"scene/others/label {k}", ", ".join(said), p) for k, (p, said) in enumerate(places)]
+    return shapes + labels
 
 
 def _matches(look: Look) -> list[Drawable]:
@@ -126,7 +139,7 @@ def _matches(look: Look) -> list[Drawable]:
     return [Lines("matches", ends, MATCH, 1.0)]
 
 
-def _found(look: Look, cloud: PointCloud) -> tuple[FloatArray, FloatArray] | None:
+def _found(look: Look, cloud: PointCloud) -> tuple[BoolArray, FloatArray] | None:
     """(N,) which points of a cloud the region was carried to, and colours of these; None if none were."""
     match = None if look.action is None else look.action.match
     if match is None or match.T_query_support is None or not len(match.region):
@@ -136,7 +149,7 @@ def _found(look: Look, cloud: PointCloud) -> tuple[FloatArray, FloatArray] | Non
     there = distance[:, 0] < FOUND
     if not there.any():
         return None
-    return there, _region_colors(look.shown, len(carried))[index[there, 0]]
+    return there, np.asarray(_region_colors(look.shown, len(carried))[index[there, 0]])
 
 
 def _region_colors(shown: Shown | None, count: int) -> FloatArray:
@@ -165,7 +178,7 @@ def _gripper(name: str, action: Action, color: Color, shift: FloatArray, width: 
 
 
 def _title(name: str, text: str, cloud: PointCloud, shift: FloatArray) -> Label:
-    """Above the back of a cloud, seen from the front."""
+    """Before a cloud, seen from the front."""
     lower, upper = cloud.points.min(axis=0), cloud.points.max(axis=0)
-    p = np.array([lower[0], (lower[1] + upper[1]) / 2, upper[2] + 0.1])
+    p = np.array([upper[0] + 0.12, (lower[1] + upper[1]) / 2, lower[2]])
     return Label(name, text, p + shift, 1.6)

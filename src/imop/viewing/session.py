@@ -31,7 +31,7 @@ class Session:
         self.over = False
         self.words = ""
         decider.reset()
-        self._see(None)
+        self.looks.append(self._see(None))
 
     @property
     def present(self) -> Look:
@@ -49,12 +49,7 @@ class Session:
             ImopError, ConnectionError: if nothing can be seen.
         """
         self._going_on()
-        kept = self.looks.pop()
-        try:
-            self._see(focus)
-        except BaseException:
-            self.looks.append(kept)
-            raise
+        self.looks[-1] = self._see(focus)
 
     def choose(self, number: int) -> None:
         """Look at another choice.
@@ -113,7 +108,7 @@ class Session:
         outcome = self._world.perform(action)
         self.over, self.words = outcome.over, outcome.words
         if not self.over:
-            self._see(None)
+            self.looks.append(self._see(None))
 
     def stop(self) -> None:
         """Bring to rest what moves; may be called from any thread."""
@@ -123,10 +118,10 @@ class Session:
         if self.over:
             raise InvalidInput("episode", "it is over", "a new one")
 
-    def _see(self, focus: Focus | None) -> None:
+    def _see(self, focus: Focus | None) -> Look:
         observation = self._world.observe()
         look = replace(self._decider.decide(observation, focus), known=self._world.known())
-        self.looks.append(self._with_way(look))
+        return self._with_way(look)
 
     def _with_way(self, look: Look) -> Look:
         """With the way to what is looked at, planned once."""

@@ -1,4 +1,4 @@
-"""The browser window: shapes, a slider over the steps, and the buttons of a session. Only here is viser known."""
+"""The browser window: shapes, a slider over steps, and a session's buttons. Nobody else knows viser."""
 
 import threading
 from collections.abc import Callable
@@ -24,7 +24,9 @@ LAYERS = {
 }
 """What can be left out: its name, and the beginnings of the names of shapes."""
 # Where the window looks from, and at what, seen from the middle between both clouds, metres.
-_EYE, _AT = np.array([1.45, 0.0, 0.95]), np.array([0.0, 0.0, -0.08])
+_EYE, _AT = np.array([1.3, 0.0, 1.0]), np.array([0.05, 0.0, 0.02])
+# A window that is narrower than this, in heights of it, looks from farther away.
+_ASPECT = 1.6
 
 
 class Window:
@@ -34,25 +36,20 @@ class Window:
         session: the episode.
         host: address to listen on; by default this machine alone can look.
         port: of the page.
-        title: of the page.
 
     Raises:
         MissingExtra: without viser.
     """
 
-    def __init__(
-        self, session: Session, host: str = "127.0.0.1", port: int = 8080, title: str = "imop"
-    ) -> None:
+    def __init__(self, session: Session, host: str = "127.0.0.1", port: int = 8080) -> None:
         self._session, self._busy, self._drawing = session, threading.Lock(), threading.RLock()
-        self.server = viser.ViserServer(host=host, port=port, label=title, verbose=False)
+        self.server = viser.ViserServer(host=host, port=port, label="imop view", verbose=False)
         self.url = f"http://{host}:{self.server.get_port()}"
         self._drawn: dict[str, Any] = {}
         self._make_panel()
         self._show_all()
-        middle = np.mean([_middle(session.present), _middle(session.present) + ASIDE], axis=0)
-        self.server.initial_camera.position = middle + _EYE
-        self.server.initial_camera.look_at = middle + _AT
         self.server.initial_camera.fov = np.radians(50)
+        self.server.on_client_connect(self._place_camera)
 
     def __enter__(self) -> "Window":
         return self
@@ -62,41 +59,34 @@ class Window:
     ) -> None:
         self.server.stop()
 
+    @property
+    def pointing(self) -> bool:
+        """Whether the next click says what is meant."""
+        return bool(self._pointing.value)
+
     def _make_panel(self) -> None:
         gui = self.server.gui
-        gui.configure_theme(
-            control_layout="fixed", control_width="medium", show_logo=False, show_share_button=False
-        )
+        # Sharing would lead the page through somebody else's server.
+        gui.configure_theme(show_logo=False, show_share_button=False)
+        gui.main_panel.dock_right()
         self.server.scene.set_up_direction("+z")
         self._told = gui.add_markdown("")
         self._step = gui.add_slider("step", 1, 2, 1, 1)
         self._choice = gui.add_dropdown("candidate", ("-",))
-        self._buttons = {
-            name: gui.add_button(name, hint=hint, color=color)
-            for name, hint, color in (
-                ("accept", "do what is shown", "green"),
-                ("reject", "not this one: show the next candidate", "orange"),
-                ("look", "look and decide anew", "blue"),
-                ("stop", "bring to rest what moves", "red"),
-            )
-        }
-        self._pointing = gui.add_checkbox(
-            "click on what is meant",
-            False,
-            hint="then click on the thing in the scene that is to be acted on",
-        )
+        self._accept = gui.add_button("accept", hint="do what is shown", color="green")
+        self._reject = gui.add_button("reject", hint="show the next candidate instead", color="orange")
+        self._look = gui.add_button("look", hint="look and decide anew")
+        stop = gui.add_button("stop", hint="bring to rest what moves", color="red")
+        hint = "then click on the thing that is to be acted on"
+        self._pointing = gui.add_checkbox("click on what is meant", False, hint=hint)
         self._layers = {name: gui.add_checkbox(name, True) for name in LAYERS}
         gui.add_html(_legend())
         self._step.on_update(self._chosen_step)
         self._choice.on_update(self._chosen_candidate)
-        actions: dict[str, Callable[[], object]] = {
-            "accept": self._session.accept,
-            "reject": self._session.reject,
-            "look": self._session.look,
-        }
-        for name, action in actions.items():
-            self._buttons[name].on_click(lambda event, do=action: self._do(do))
-        self._buttons["stop"].on_click(lambda event: self._session.stop())
+        self._accept.on_click(lambda event: self._do(self._session.accept))
+        self._reject.on_click(lambda event: self._do(self._session.reject))
+        self._look.on_click(lambda event: self._do(self._session.look))
+        stop.on_click(lambda event: self._session.stop())
         for layer in self._layers.values():
             layer.on_update(lambda event: self._show_layers())
         self.server.scene.on_click()(self._clicked)
@@ -116,8 +106,8 @@ class Window:
             self._busy.release()
 
     def _clicked(self, event: viser.SceneClickEvent) -> None:
-        if self._pointing.value:
-            self._pointing.value = False
+        if self.pointing:
+            _set(self._pointing, False)
             origin, direction = np.array(event.ray_origin), np.array(event.ray_direction)
             self._do(lambda: self._session.point(origin, direction))
 
@@ -138,17 +128,18 @@ class Window:
     def _show_all(self) -> None:
         """The present step, and how many there are."""
         count = len(self._session.looks)
-        self._step.max, self._step.value, self._step.disabled = max(2, count), count, count == 1
+        self._step.max, self._step.disabled = max(2, count), count == 1
+        _set(self._step, count)
         self._show(self._session.present)
 
     def _show(self, look: Look) -> None:
         names = tuple(f"{k + 1}: {action.confidence:.0%}" for k, action in enumerate(look.choices)) or ("-",)
         present = look is self._session.present and not self._session.over
         with self._drawing, self.server.atomic():
-            self._choice.options, self._choice.value = names, names[look.chosen]
-            for name in ("accept", "reject"):
-                self._buttons[name].disabled = not present or not look.choices
-            self._buttons["look"].disabled = self._pointing.disabled = not present
+            self._choice.options = names
+            _set(self._choice, names[look.chosen])
+            self._accept.disabled = self._reject.disabled = not present or not look.choices
+            self._look.disabled = self._pointing.disabled = not present
             for handle in self._drawn.values():
                 handle.remove()
             self._drawn = {shape.name: self._add(shape) for shape in draw(look)}
@@ -161,17 +152,19 @@ class Window:
                 if name.startswith(beginnings):
                     handle.visible = self._layers[layer].value
 
+    def _place_camera(self, client: viser.ClientHandle) -> None:
+        """So that both clouds are seen in a window of any shape."""
+        points = self._session.present.scene.fused.points
+        middle = (points.min(axis=0) + points.max(axis=0)) / 2 + ASIDE / 2
+        client.camera.position = middle + _EYE * max(1.0, _ASPECT / client.camera.aspect)
+        client.camera.look_at = middle + _AT
+
     def _add(self, shape: Drawable) -> Any:
         scene, name = self.server.scene, f"/{shape.name}"
         if isinstance(shape, Points):
-            return scene.add_point_cloud(
-                name,
-                shape.points,
-                shape.colors,
-                point_size=shape.size,
-                precision="float32",
-                point_shading="flat",
-            )
+            handle = scene.add_point_cloud(name, shape.points, shape.colors, point_size=shape.size)
+            handle.point_shading = "flat"
+            return handle
         if isinstance(shape, Label):
             return scene.add_label(
                 name, shape.text, position=shape.p, font_screen_scale=shape.scale, anchor="bottom-center"
@@ -189,10 +182,8 @@ def report(look: Look, session: Session) -> str:
         origin = "" if match is None else f"Step **{match.step + 1}** of the demonstration, "
         by = "" if match is None or not match.generator else f"by *{match.generator}*, "
         lines.append(f"{origin}{by}right with **{action.confidence:.0%}**.")
-        then = "open" if action.gripper_open else "closed"
-        lines.append(
-            f"Then the gripper is {then}." + (" May touch things." if action.allow_collisions else "")
-        )
+        touching = ", and may touch things" if action.allow_collisions else ""
+        lines.append(f"{'Opens' if action.gripper_open else 'Closes'} then{touching}.")
         if action.reachable is False:
             lines.append("**The arm cannot reach it.**")
     lines += [f"**{look.problem}**"] * bool(look.problem)
@@ -200,9 +191,9 @@ def report(look: Look, session: Session) -> str:
     return "\n\n".join(lines)
 
 
-def _middle(look: Look) -> np.ndarray[Any, Any]:
-    points = look.scene.fused.points
-    return np.asarray((points.min(axis=0) + points.max(axis=0)) / 2)
+def _set(handle: Any, value: object) -> None:
+    """Type checkers take the values of viser's inputs for read-only."""
+    handle.value = value
 
 
 def _legend() -> str:
