@@ -39,8 +39,8 @@ ALLOWED = {
     },
 }
 ALLOWED["terminal"] = set()
-ALLOWED["viewing"] = ALLOWED["evaluation"] | {"evaluation", "terminal"}
 ALLOWED["reproduce"] = ALLOWED["evaluation"] | {"evaluation", "terminal"}
+ALLOWED["viewing"] = ALLOWED["reproduce"] | {"cameras", "setup"}
 
 
 def imports(path):

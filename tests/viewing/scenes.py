@@ -93,7 +93,7 @@ class FakeWorld:
                 from imop.errors import PlanFailed
 
                 raise PlanFailed("unreachable")
-        return straight(self.observe(), action)
+        return straight(self.observe().T_world_gripper, action)
 
     def known(self):
         return None

@@ -92,7 +92,7 @@ def test_probabilities_are_told_of_every_candidate():
 
 def test_the_way_begins_at_the_gripper_and_ends_where_it_goes():
     seen = look()
-    way = straight(seen.scene.observation, seen.action)
+    way = straight(seen.scene.observation.T_world_gripper, seen.action)
     path = named(draw(replace(seen, ways=(way,))))["scene/path"]
     assert isinstance(path, Path) and np.array_equal(path.points, way)
     assert "scene/path" not in named(draw(seen))

@@ -36,6 +36,7 @@ class Case:
         weights: folder of its weights; by default the bundled ones.
         robot: its name, see `robot_functions`.
         steps: so many actions were taken before, if it was recorded.
+        recovers: whether a one-shot policy tries again what came to nothing.
     """
 
     demonstration: Demonstration
@@ -44,6 +45,7 @@ class Case:
     weights: Path | None = None
     robot: str = PANDA
     steps: int = 0
+    recovers: bool = False
 
     def decider(self, policy: Policy | None = None) -> Decider:
         """Who decides, after the demonstration; `policy` instead of the method, if there is one.
@@ -54,7 +56,7 @@ class Case:
         policy = policy or make_policy(self.method, weights=self.weights, robot=self.robot)
         policy.watch(self.demonstration.stripped())
         if isinstance(policy, OneShotPolicy):
-            return PolicyDecider(policy)
+            return PolicyDecider(policy, recovers=self.recovers)
         return ActingDecider(policy, self.demonstration, Perception(robot_functions(self.robot)[0]))
 
 
@@ -80,7 +82,7 @@ def simulated(
     from imop.viewing.simulated import SimulatedWorld
 
     shown = demonstration_for(trial) if demo is None else load_demonstration(*demo)
-    return Case(shown, SimulatedWorld(trial), method, weights)
+    return Case(shown, SimulatedWorld(trial), method, weights, recovers=trial.second_try)
 
 
 def recorded(

@@ -32,6 +32,7 @@ def view(
     host: str = "127.0.0.1",
     port: int = 8080,
     ahead: int | None = None,
+    confirm: bool = False,
     screenshot: Path | None = None,
 ) -> int:
     """Show in a browser what the policy understood: region, matches, candidates, predicted gripper, path.
@@ -58,12 +59,12 @@ def view(
         port: of the page.
         ahead: so many decisions are accepted before anything is shown; all of a result if not given, and none
             of anything else.
+        confirm: ask in the terminal before every motion, without a browser.
         screenshot: PNG file to write instead of waiting for somebody; needs Chromium.
     """
-    from imop.viewing.browser import picture
     from imop.viewing.cases import from_result, recorded, simulated
+    from imop.viewing.confirm import attend
     from imop.viewing.session import Session
-    from imop.viewing.window import Window
 
     sources = {"task": task, "scene": scene, "result": result}
     chosen = [name for name, given in sources.items() if given is not None]
@@ -87,8 +88,14 @@ def view(
         for _ in range(case.steps if ahead is None and result is not None else ahead or 0):
             if not session.over:
                 session.accept()
+    if confirm:
+        return 0 if attend(session, console.input, console.print) else 1
+    from imop.viewing.window import Window
+
     with Window(session, host, port) as window:
         if screenshot is not None:
+            from imop.viewing.browser import picture
+
             with replaced(screenshot) as temporary:
                 temporary.write_bytes(picture(window.url, SIZE))
             console.print(screenshot)

@@ -41,9 +41,12 @@ class PolicyDecider:
     Args:
         policy: the policy.
         most: so many candidates are choices.
+        recovers: whether steps that came to nothing are tried again; not in a recording, where the arm is
+            elsewhere than it was sent.
     """
 
-    def __init__(self, policy: OneShotPolicy, most: int = MOST) -> None:
+    def __init__(self, policy: OneShotPolicy, most: int = MOST, recovers: bool = False) -> None:
+        policy.recovers = recovers
         self._policy, self._most = policy, most
         self._decision: Decision | None = None
 

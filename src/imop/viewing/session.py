@@ -97,15 +97,15 @@ class Session:
         """Do what is looked at, then look again.
 
         Raises:
-            InvalidInput: if the episode is over, or there is nothing to be done.
-            ImopError, ConnectionError: if nothing can be seen afterwards.
+            InvalidInput: if the episode is over, there is no choice, or no way to it is known.
+            ImopError, ConnectionError: if it cannot be begun, or nothing can be seen afterwards.
         """
         self._going_on()
         action = self.present.action
-        if action is None:
+        if action is None or self.present.way is None:
             raise InvalidInput("choice", self.present.problem, "look again, or point at what is meant")
-        self._decider.take(self.present.chosen)
         outcome = self._world.perform(action)
+        self._decider.take(self.present.chosen)
         self.over, self.words = outcome.over, outcome.words
         if not self.over:
             self.looks.append(self._see(None))

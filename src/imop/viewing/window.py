@@ -13,6 +13,7 @@ from imop.viewing.draw import ASIDE, LARGEST, SCALE, SMALLEST, draw
 from imop.viewing.drawables import Drawable, Label, Path, Points
 from imop.viewing.look import Look
 from imop.viewing.session import Session
+from imop.viewing.words import report
 
 with extra("view"):
     import viser
@@ -138,13 +139,15 @@ class Window:
         with self._drawing, self.server.atomic():
             self._choice.options = names
             _set(self._choice, names[look.chosen])
-            self._accept.disabled = self._reject.disabled = not present or not look.choices
+            self._reject.disabled = not present or not look.choices
+            self._accept.disabled = not present or look.way is None
             self._look.disabled = self._pointing.disabled = not present
             for handle in self._drawn.values():
                 handle.remove()
             self._drawn = {shape.name: self._add(shape) for shape in draw(look)}
             self._show_layers()
-            self._told.content = report(look, self._session)
+            said = f"\n\n*{self._session.words}*" if self._session.words else ""
+            self._told.content = report(look) + said
 
     def _show_layers(self) -> None:
         for layer, beginnings in LAYERS.items():
@@ -172,23 +175,6 @@ class Window:
         ends = np.stack([shape.points[:-1], shape.points[1:]], 1) if isinstance(shape, Path) else shape.ends
         color = np.array(shape.color)
         return scene.add_line_segments(name, ends, color, thickness=shape.width, thickness_units="screen")
-
-
-def report(look: Look, session: Session) -> str:
-    """What is decided, in Markdown."""
-    lines = []
-    action, match = look.action, None if look.action is None else look.action.match
-    if action is not None:
-        origin = "" if match is None else f"Step **{match.step + 1}** of the demonstration, "
-        by = "" if match is None or not match.generator else f"by *{match.generator}*, "
-        lines.append(f"{origin}{by}right with **{action.confidence:.0%}**.")
-        touching = ", and may touch things" if action.allow_collisions else ""
-        lines.append(f"{'Opens' if action.gripper_open else 'Closes'} then{touching}.")
-        if action.reachable is False:
-            lines.append("**The arm cannot reach it.**")
-    lines += [f"**{look.problem}**"] * bool(look.problem)
-    lines += [f"*{session.words}*"] * bool(session.words)
-    return "\n\n".join(lines)
 
 
 def _set(handle: Any, value: object) -> None:

@@ -45,7 +45,11 @@ class World(Protocol):
         ...
 
     def perform(self, action: Action) -> Outcome:
-        """Do it."""
+        """Do it.
+
+        Raises:
+            ImopError, ConnectionError: if it was not even begun.
+        """
         ...
 
     def stop(self) -> None:
@@ -53,9 +57,9 @@ class World(Protocol):
         ...
 
 
-def straight(observation: Observation, action: Action) -> FloatArray:
-    """(2, 3) the straight way of the tip, metres."""
-    return np.stack([observation.T_world_gripper[:3, 3], action.T_world_gripper[:3, 3]])
+def straight(T_world_gripper: FloatArray, action: Action) -> FloatArray:
+    """(2, 3) the straight way of the tip from a pose (4, 4) to an action's, metres."""
+    return np.stack([T_world_gripper[:3, 3], action.T_world_gripper[:3, 3]])
 
 
 class RecordedWorld:
@@ -74,7 +78,7 @@ class RecordedWorld:
 
     def way(self, action: Action) -> FloatArray:
         """Straight, since nobody plans."""
-        return straight(self.observe(), action)
+        return straight(self.observe().T_world_gripper, action)
 
     def known(self) -> FloatArray:
         """Where the gripper went."""
