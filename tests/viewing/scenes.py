@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from imop.errors import PlanFailed
 from imop.geometry import se3
 from imop.geometry.neighbours import within
 from imop.policy.interfaces import Scene
@@ -81,18 +82,17 @@ class FakeWorld:
     """Three actions, then it is done."""
 
     def __init__(self, length=3, fails=()):
-        self.performed, self.stopped = [], 0
+        self.performed, self.stopped, self.blind = [], 0, False
         self._length, self._fails = length, fails
 
     def observe(self):
+        if self.blind:
+            raise ConnectionError("the camera is gone")
         return observed_scene().observation
 
     def way(self, action):
-        for T in self._fails:
-            if np.allclose(T, action.T_world_gripper):
-                from imop.errors import PlanFailed
-
-                raise PlanFailed("unreachable")
+        if any(np.allclose(T, action.T_world_gripper) for T in self._fails):
+            raise PlanFailed("unreachable")
         return straight(self.observe().T_world_gripper, action)
 
     def known(self):

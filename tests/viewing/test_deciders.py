@@ -7,6 +7,7 @@ import pytest
 
 from imop.errors import InvalidInput, NoConfidentMatch
 from imop.geometry import se3
+from imop.geometry.focus import Focus
 from imop.policy.interfaces import Candidate
 from imop.policy.one_shot import OneShotPolicy
 from imop.types import Action, Demonstration, Keyframe
@@ -113,8 +114,35 @@ def test_what_tells_no_match_is_shown_without_a_demonstration():
     assert len(seen.choices) == 1 and seen.shown is None
 
 
-def test_what_only_acts_may_be_unsure_and_is_told_nothing():
-    decider = ActingDecider(Acting(None), DEMONSTRATION, PERCEPTION)
-    assert "0.50" in decider.decide(SEEN.observation).problem
+def test_what_only_acts_may_be_unsure():
+    seen = ActingDecider(Acting(None), DEMONSTRATION, PERCEPTION).decide(SEEN.observation)
+    assert "0.50" in seen.problem and seen.choices == ()
+
+
+def test_what_counts_its_steps_is_asked_again_only_where_nothing_was_done():
+    policy = Acting(look().choices[0])
+    decider = ActingDecider(policy, DEMONSTRATION, PERCEPTION)
+    decider.decide(SEEN.observation)
+    decider.decide(SEEN.observation)
+    assert policy.resets == 1
+    decider.take(0)
+    decider.decide(SEEN.observation)
+    with pytest.raises(InvalidInput, match="again"):
+        decider.decide(SEEN.observation)
+    assert policy.resets == 1
+
+
+def test_a_focus_is_told_to_whom_it_can_be_told():
+    told, focus = [], Focus(points=BLUE_AT[None, :3, 3])
     with pytest.raises(InvalidInput, match="focus"):
-        decider.decide(SEEN.observation, focus=object())
+        ActingDecider(Acting(None), DEMONSTRATION, PERCEPTION).decide(SEEN.observation, focus)
+
+    class Told(Acting):
+        def act(self, observation, focus=None):
+            told.append(focus)
+            return self.action
+
+    decider = ActingDecider(Told(look().choices[0]), DEMONSTRATION, PERCEPTION)
+    decider.decide(SEEN.observation, focus)
+    decider.decide(SEEN.observation)
+    assert told == [focus, None]

@@ -85,6 +85,25 @@ def test_a_choice_without_a_way_says_so_and_another_may_have_one():
     assert np.allclose(session.present.way[-1], session.present.action.T_world_gripper[:3, 3])
 
 
+def test_what_is_done_is_not_done_again_though_nothing_can_be_seen_afterwards(session):
+    session._world.blind = True
+    with pytest.raises(ConnectionError):
+        session.accept()
+    with pytest.raises(InvalidInput, match="look again"):
+        session.accept()
+    session._world.blind = False
+    session.look()
+    session.accept()
+    assert session._decider.taken == [0, 0] and len(session.looks) == 3
+
+
+def test_a_choice_without_a_way_is_not_accepted():
+    session = Session(FakeDecider(), FakeWorld(fails=[look().choices[0].T_world_gripper]))
+    with pytest.raises(InvalidInput, match="unreachable"):
+        session.accept()
+    assert session._world.performed == [] and session._decider.taken == []
+
+
 def test_a_choice_that_is_not_there_is_refused(session):
     with pytest.raises(InvalidInput, match="choice"):
         session.choose(2)

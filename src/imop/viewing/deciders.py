@@ -1,5 +1,6 @@
 """Who decides what is done next, and shows why: a one-shot policy, or anything that only says what to do."""
 
+import inspect
 from typing import Protocol
 
 from imop.errors import InvalidInput, NoConfidentMatch
@@ -80,35 +81,50 @@ class PolicyDecider:
 class ActingDecider:
     """Anything that has `watch`, `reset` and `act`: a client of `imop serve`, a method of one's own.
 
-    There is one choice, and it cannot be told a focus. It counts what it was asked as done, so asked again it
-    may be a step further.
+    There is one choice. What it was asked it counts as done, so it can be asked again only at the beginning
+    of an episode, which then begins anew.
 
     Args:
-        policy: has watched the demonstration.
+        policy: has watched the demonstration; it is told a focus if its `act` takes one.
         demonstration: the same, to be shown.
         perception: makes the clouds that are shown.
     """
 
     def __init__(self, policy: Policy, demonstration: Demonstration, perception: Perception) -> None:
         self._policy, self._demonstration, self._perception = policy, demonstration, perception
+        self._told = "focus" in inspect.signature(policy.act).parameters
+        self._taken, self._waiting = 0, False
 
     def reset(self) -> None:
         """A new episode begins."""
+        self._taken, self._waiting = 0, False
         self._policy.reset()
 
     def decide(self, observation: Observation, focus: Focus | None = None) -> Look:
-        """What it would do, with its match if it tells one."""
-        if focus is not None:
+        """What it would do, with its match if it tells one.
+
+        Raises:
+            InvalidInput: if it cannot be told a focus, or is asked again after the first step.
+            ImopError: as its `act` does.
+        """
+        if focus is not None and not self._told:
             raise InvalidInput("focus", "this method cannot be told what is meant", "a one-shot policy here")
+        if self._waiting and self._taken:
+            problem = "this method counts what it was asked as done, so it cannot be asked again"
+            raise InvalidInput("look", problem, "to accept, or a new episode")
+        if self._waiting:
+            self._policy.reset()
         scene = Scene(observation, self._perception.points(observation))
         try:
-            action = self._policy.act(observation)
+            action = self._policy.act(observation, **({} if focus is None else {"focus": focus}))
         except NoConfidentMatch as error:
             return Look(scene, problem=str(error))
+        self._waiting = True
         return Look(scene, (action,), self._shown(action))
 
     def take(self, number: int) -> None:
         """It was counted when it was asked."""
+        self._taken, self._waiting = self._taken + 1, False
 
     def _shown(self, action: Action) -> Shown | None:
         if action.match is None:

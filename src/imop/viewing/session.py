@@ -108,7 +108,9 @@ class Session:
         self._decider.take(self.present.chosen)
         self.over, self.words = outcome.over, outcome.words
         if not self.over:
-            self.looks.append(self._see(None))
+            # What is done must not be done again, even if nothing can be seen now.
+            self.looks.append(Look(self.present.scene, problem="nothing was seen since: look again"))
+            self.looks[-1] = self._see(None)
 
     def stop(self) -> None:
         """Bring to rest what moves; may be called from any thread."""

@@ -27,7 +27,7 @@ LAYERS = {
 # Where the window looks from, and at what, seen from the middle between both clouds, metres.
 _EYE, _AT = np.array([1.3, 0.0, 1.0]), np.array([0.05, 0.0, 0.02])
 # A window that is narrower than this, in heights of it, looks from farther away.
-_ASPECT = 1.6
+_ASPECT = 1.8
 
 
 class Window:
