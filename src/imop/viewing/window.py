@@ -1,5 +1,6 @@
 """The browser window: shapes, a slider over steps, and a session's buttons. Nobody else knows viser."""
 
+import logging
 import threading
 from collections.abc import Callable
 from types import TracebackType
@@ -44,6 +45,8 @@ class Window:
 
     def __init__(self, session: Session, host: str = "127.0.0.1", port: int = 8080) -> None:
         self._session, self._busy, self._drawing = session, threading.Lock(), threading.RLock()
+        # Browsers connect ahead and then ask nothing, which is no error to be told of.
+        logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
         self.server = viser.ViserServer(host=host, port=port, label="imop view", verbose=False)
         self.url = f"http://{host}:{self.server.get_port()}"
         self._drawn: dict[str, Any] = {}
