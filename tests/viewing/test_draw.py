@@ -90,6 +90,13 @@ def test_probabilities_are_told_of_every_candidate():
     assert any("step 1 of 2" in text for text in texts) and any("80%" in text for text in texts)
 
 
+def test_what_is_most_unlikely_is_not_drawn_unless_it_is_looked_at():
+    seen = look(probabilities=(0.8, 0.001))
+    assert "scene/others/1" not in named(draw(seen))
+    T = named(draw(seen.choose(1)))["scene/gripper"].T
+    assert np.allclose(T, seen.choices[1].T_world_gripper)
+
+
 def test_the_way_begins_at_the_gripper_and_ends_where_it_goes():
     seen = look()
     way = straight(seen.scene.observation.T_world_gripper, seen.action)

@@ -89,7 +89,10 @@ def view(
             if not session.over:
                 session.accept()
     if confirm:
-        return 0 if attend(session, console.input, console.print) else 1
+        from rich.markdown import Markdown
+
+        done = attend(session, console.input, lambda text: console.print(Markdown(text)))
+        return 0 if done else 1
     from imop.viewing.window import Window
 
     with Window(session, host, port) as window:

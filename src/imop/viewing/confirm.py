@@ -6,7 +6,7 @@ from imop.errors import ImopError
 from imop.viewing.session import Session
 from imop.viewing.words import report
 
-QUESTION = "[y]es, [n]ext candidate, [l]ook again, [q]uit: "
+QUESTION = "y: do it, n: next candidate, l: look again, q: quit > "
 
 
 def attend(session: Session, ask: Callable[[str], str], tell: Callable[[str], object]) -> bool:

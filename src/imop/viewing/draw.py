@@ -38,6 +38,8 @@ OTHER: Color = (0.55, 0.62, 0.9)
 NOW: Color = (0.35, 0.35, 0.35)
 KNOWN: Color = (0.0, 0.6, 0.2)
 MEANT: Color = (0.95, 0.2, 0.75)
+# Other choices that are less probable than this are named in a list, but not drawn.
+UNLIKELY = 0.005
 # Words that are nearer to each other than this are read as one, metres.
 ONE_PLACE = 0.06
 # How much of a scene's colours is left, so that what is marked stands out.
@@ -112,10 +114,12 @@ def _scene(look: Look) -> list[Drawable]:
 
 
 def _others(look: Look) -> list[Drawable]:
-    """All choices with their probabilities; those in one place share their words."""
+    """Choices with their probabilities; those in one place share their words."""
     shapes: list[Drawable] = []
     places: list[tuple[FloatArray, list[str]]] = []
     for number, action in enumerate(look.choices):
+        if number != look.chosen and action.confidence < UNLIKELY:
+            continue
         if number != look.chosen:
             shapes.append(_gripper(f"scene/others/{number}", action, OTHER, np.zeros(3), 2.0))
         p_hand = se3.apply(action.T_world_gripper, np.array([[0.0, 0.0, -0.12]]))[0]

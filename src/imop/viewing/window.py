@@ -26,9 +26,9 @@ LAYERS = {
 }
 """What can be left out: its name, and the beginnings of the names of shapes."""
 # Where the window looks from, and at what, seen from the middle between both clouds, metres.
-_EYE, _AT = np.array([1.3, 0.0, 1.0]), np.array([0.05, 0.0, 0.02])
-# A window that is narrower than this, in heights of it, looks from farther away.
-_ASPECT = 1.8
+_EYE, _AT = np.array([1.3, 0.0, 1.0]), np.array([0.05, 0.0, 0.05])
+# A window that is narrower than this, in heights of it and with the panel, looks from farther away.
+_ASPECT = 2.35
 
 
 class Window:

@@ -1,6 +1,4 @@
-"""A decision in words, as Markdown that is legible in a terminal too."""
-
-import numpy as np
+"""A decision in words, as Markdown."""
 
 from imop.viewing.look import Look
 
@@ -14,8 +12,8 @@ def report(look: Look) -> str:
         by = "" if match is None or not match.generator else f"by *{match.generator}*, "
         lines.append(f"{origin}{by}right with **{action.confidence:.0%}**.")
         touching = " It may touch things." if action.allow_collisions else ""
-        p = np.array2string(action.T_world_gripper[:3, 3], precision=3, suppress_small=True)
-        lines.append(f"To {p} m, then {'open' if action.gripper_open else 'close'}.{touching}")
+        p = ", ".join(f"{value:.3f}" for value in action.T_world_gripper[:3, 3])
+        lines.append(f"To ({p}) m, then {'open' if action.gripper_open else 'close'}.{touching}")
         if action.reachable is False:
             lines.append("**The arm cannot reach it.**")
     if look.problem:
