@@ -18,6 +18,7 @@ MODULES = {
     "train": ("lightning_fabric", "tensorboard"),
     "baselines": ("open3d",),
     "cluster": ("ray",),
+    "view": ("viser", "websockets"),
 }
 EVERY = tuple(module for modules in MODULES.values() for module in modules)
 # Imports every module; prints which extra it lacks, or a dash.
@@ -75,6 +76,10 @@ def test_the_base_is_all_that_a_policy_needs(base_only, package):
         ("imop.evaluation.appearance", "sim"),
         ("imop.training.config", "-"),
         ("imop.training.stage", "sim"),
+        ("imop.viewing.cases", "-"),
+        ("imop.viewing.draw", "-"),
+        ("imop.viewing.simulated", "sim"),
+        ("imop.viewing.window", "view"),
     ],
 )
 def test_what_is_beyond_the_base_names_its_extra(base_only, module, extra):
