@@ -19,6 +19,7 @@ ALLOWED = {
     "baselines": BASE | {"geometry", "demos", "networks", "robots"},
     "policy": BASE | {"geometry", "demos", "networks"},
     "robots": BASE | {"geometry"},
+    "cameras": BASE | {"geometry"},
     "sim": BASE | {"geometry", "robots"},
     "tasks": BASE | {"geometry", "robots", "sim", "plugins"},
     "training": BASE | {"geometry", "demos", "networks", "policy", "robots", "sim"},
