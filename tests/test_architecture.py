@@ -20,6 +20,7 @@ ALLOWED = {
     "policy": BASE | {"geometry", "demos", "networks"},
     "robots": BASE | {"geometry"},
     "cameras": BASE | {"geometry"},
+    "setup": BASE | {"geometry", "demos", "robots", "cameras", "sim", "terminal"},
     "sim": BASE | {"geometry", "robots"},
     "tasks": BASE | {"geometry", "robots", "sim", "plugins"},
     "training": BASE | {"geometry", "demos", "networks", "policy", "robots", "sim"},
