@@ -19,6 +19,8 @@ ALLOWED = {
     "baselines": BASE | {"geometry", "demos", "networks", "robots"},
     "policy": BASE | {"geometry", "demos", "networks"},
     "robots": BASE | {"geometry"},
+    "cameras": BASE | {"geometry"},
+    "setup": BASE | {"geometry", "demos", "robots", "cameras", "sim", "terminal"},
     "sim": BASE | {"geometry", "robots"},
     "tasks": BASE | {"geometry", "robots", "sim", "plugins"},
     "training": BASE | {"geometry", "demos", "networks", "policy", "robots", "sim"},

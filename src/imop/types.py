@@ -92,7 +92,44 @@ def as_pose(name: str, value: Any) -> FloatArray:
     return T
 
 
-def _set(instance: object, **values: object) -> None:
+def as_image(name: str, value: Any) -> ByteArray:
+    """Convert `value` to an image, (H, W, 3) uint8, of at least one pixel.
+
+    Raises:
+        InvalidInput: if it is none.
+    """
+    image: ByteArray = as_array(name, value, (None, None, 3), np.uint8)
+    if not image.size:
+        raise InvalidInput(name, f"shape {image.shape}", "an image with at least one pixel")
+    return image
+
+
+def as_intrinsics(name: str, value: Any) -> FloatArray:
+    """Convert `value` to a camera matrix without skew, (3, 3), pixels.
+
+    Raises:
+        InvalidInput: if it is none.
+    """
+    K = as_finite(name, value, (3, 3))
+    if not (K[0, 0] > 0 and K[1, 1] > 0 and np.allclose(K[[1, 2, 2, 2], [0, 0, 1, 2]], (0, 0, 0, 1))):
+        raise InvalidInput(name, f"{K.tolist()}", "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]], fx, fy > 0")
+    return K
+
+
+def as_fraction(name: str, value: float) -> float:
+    """A fraction of the stroke; measurements up to 0.01 outside of 0 .. 1 are clipped.
+
+    Raises:
+        InvalidInput: if it is farther outside, or no number.
+    """
+    fraction = float(value)
+    if not -0.01 <= fraction <= 1.01:
+        raise InvalidInput(name, f"{fraction}", "a fraction of the stroke, 0 closed .. 1 open")
+    return min(max(fraction, 0.0), 1.0)
+
+
+def freeze(instance: object, **values: object) -> None:
+    """Set fields of a frozen dataclass while it is being made."""
     for name, value in values.items():
         object.__setattr__(instance, name, value)
 
@@ -119,21 +156,14 @@ class CameraView:
     instance_ids: IntArray | None = None
 
     def __post_init__(self) -> None:
-        rgb = as_array("rgb", self.rgb, (None, None, 3), np.uint8)
+        rgb = as_image("rgb", self.rgb)
         image = rgb.shape[:2]
-        if not rgb.size:
-            raise InvalidInput("rgb", f"shape {rgb.shape}", "an image with at least one pixel")
-        K = as_finite("intrinsics", self.intrinsics, (3, 3))
-        if not (K[0, 0] > 0 and K[1, 1] > 0 and np.allclose(K[[1, 2, 2, 2], [0, 0, 1, 2]], (0, 0, 0, 1))):
-            raise InvalidInput(
-                "intrinsics", f"{K.tolist()}", "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]], fx, fy > 0"
-            )
         ids = self.instance_ids
-        _set(
+        freeze(
             self,
             rgb=rgb,
             depth=as_array("depth", self.depth, image, np.float32),
-            intrinsics=K,
+            intrinsics=as_intrinsics("intrinsics", self.intrinsics),
             T_world_camera=as_pose("T_world_camera", self.T_world_camera),
             instance_ids=None if ids is None else as_array("instance_ids", ids, image, np.int32),
         )
@@ -169,17 +199,12 @@ class Observation:
     def __post_init__(self) -> None:
         if not self.views:
             raise InvalidInput("views", "empty", "at least one camera view")
-        opening = float(self.gripper_opening)
-        if not -0.01 <= opening <= 1.01:
-            raise InvalidInput(
-                "gripper_opening", f"{opening}", "a fraction of the stroke, 0 closed .. 1 open"
-            )
         q, dq = self.joint_positions, self.joint_velocities
-        _set(
+        freeze(
             self,
             views=dict(self.views),
             T_world_gripper=as_pose("T_world_gripper", self.T_world_gripper),
-            gripper_opening=min(max(opening, 0.0), 1.0),
+            gripper_opening=as_fraction("gripper_opening", self.gripper_opening),
             time_step=int(self.time_step),
             joint_positions=None if q is None else as_finite("joint_positions", q, (None,)),
             joint_velocities=None if dq is None else as_finite("joint_velocities", dq, (None,)),
@@ -217,14 +242,14 @@ class Match:
     def __post_init__(self) -> None:
         if not 0.0 <= self.probability <= 1.0:
             raise InvalidInput("probability", f"{self.probability}", "a number between 0 and 1")
-        _set(
+        freeze(
             self,
             p_support=as_array("p_support", self.p_support, (None, 3)),
             p_query=as_array("p_query", self.p_query, (len(self.p_support), 3)),
             region=as_array("region", self.region, (None, 3)),
         )
         if self.T_query_support is not None:
-            _set(self, T_query_support=as_pose("T_query_support", self.T_query_support))
+            freeze(self, T_query_support=as_pose("T_query_support", self.T_query_support))
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,7 +275,7 @@ class Action:
     def __post_init__(self) -> None:
         if not 0.0 <= self.confidence <= 1.0:
             raise InvalidInput("confidence", f"{self.confidence}", "a number between 0 and 1")
-        _set(
+        freeze(
             self,
             T_world_gripper=as_pose("T_world_gripper", self.T_world_gripper),
             gripper_open=bool(self.gripper_open),
@@ -276,7 +301,7 @@ class Keyframe:
 
     def __post_init__(self) -> None:
         if self.T_world_object is not None:
-            _set(self, T_world_object=as_pose("T_world_object", self.T_world_object))
+            freeze(self, T_world_object=as_pose("T_world_object", self.T_world_object))
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,7 +327,7 @@ class Demonstration:
     def __post_init__(self) -> None:
         if not self.keyframes:
             raise InvalidInput("keyframes", "the demonstration has no keyframe", "at least one step")
-        _set(self, keyframes=tuple(self.keyframes), instructions=tuple(self.instructions))
+        freeze(self, keyframes=tuple(self.keyframes), instructions=tuple(self.instructions))
 
     def __len__(self) -> int:
         return len(self.keyframes)

@@ -20,8 +20,8 @@ _OWN = (
 Reachable = Callable[[FloatArray], bool]
 
 
-class Robot(Protocol):
-    """A robot of one's own, in the frame of its base."""
+class RobotModel(Protocol):
+    """What a robot of one's own looks like and reaches, in the frame of its base; nothing of it moves."""
 
     def is_robot(self, p_base: FloatArray, joint_positions: FloatArray, gripper_opening: float) -> BoolArray:
         """(N,) which points (N, 3) are the robot's; joint positions as recorded, opening 0 .. 1."""
@@ -52,14 +52,14 @@ def robot_functions(name: str = PANDA) -> tuple[RobotMask, Reachable | None]:
     return is_robot, lambda T_world_gripper: robot.reachable(T_base_world @ T_world_gripper)
 
 
-def _own(name: str) -> Robot:
+def _own(name: str) -> RobotModel:
     factory = plugins.find("robot", name, "imop.robots")
     if not (inspect.isclass(factory) or inspect.isfunction(factory)) or not plugins.takes_nothing(factory):
         raise InvalidInput("robot", name, f"{PANDA}, or {_OWN}")
     robot = factory()
     if not all(callable(getattr(robot, part, None)) for part in ("is_robot", "reachable")):
         raise InvalidInput("robot", f"{name} makes a {type(robot).__name__}", _OWN)
-    return cast(Robot, robot)
+    return cast(RobotModel, robot)
 
 
 def _panda_reachable() -> Reachable | None:

@@ -1,0 +1,1 @@
+"""Cameras: what imop asks of one, and drivers."""

@@ -1,0 +1,307 @@
+"""The set-up as a file: TOML or JSON, by its ending. Errors name the field as it stands in the file."""
+
+import json
+import tomllib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from imop.errors import CorruptData, InvalidInput
+from imop.files import read, replaced
+from imop.geometry import se3
+from imop.setup.setup import (
+    CameraSetup,
+    GripperSetup,
+    Limits,
+    Part,
+    RobotSetup,
+    Setup,
+    WorkspaceSetup,
+)
+from imop.types import FloatArray, as_finite, as_pose
+
+T = TypeVar("T")
+_MISSING = object()
+_POSE = "{position = [x, y, z], quaternion = [x, y, z, w]} in metres, or four rows of four numbers"
+_INTRINSICS = "{fx = ..., fy = ..., cx = ..., cy = ...} in pixels, or three rows of three numbers"
+
+
+def load_setup(path: Path) -> Setup:
+    """Read a set-up.
+
+    Args:
+        path: a .toml or .json file.
+
+    Raises:
+        CorruptData: if it is missing, or neither TOML nor JSON.
+        InvalidInput: for a field that is missing, unknown or cannot be; the field is named.
+    """
+    content = read(path, "write one, see docs/real_robot/setup.md").decode(errors="replace")
+    try:
+        fields = _format(path).loads(content)
+    except ValueError as error:
+        raise CorruptData(path, f"cannot be read ({error})", "mend what is said there") from error
+    return from_dict(fields, path.parent)
+
+
+def save_setup(setup: Setup, path: Path) -> None:
+    """Write a set-up; `load_setup` gives it back. A model's path is written as it is.
+
+    Raises:
+        InvalidInput: if the ending is neither .toml nor .json.
+    """
+    form, fields = _format(path), to_dict(setup)
+    with replaced(path) as temporary:
+        temporary.write_text(_toml(fields) if form is tomllib else json.dumps(fields, indent=2) + "\n")
+
+
+def from_dict(fields: Mapping[str, Any], folder: Path = Path()) -> Setup:
+    """The set-up of what stands in a file; a model's path is relative to `folder`.
+
+    Raises:
+        InvalidInput: for a field that is missing, unknown or cannot be.
+    """
+    top = _Table("", fields)
+    robot, workspace = top.table("robot"), top.table("workspace")
+    gripper, limits = top.table("gripper", optional=True), top.table("limits", optional=True)
+    cameras, parts = top.table("cameras"), top.table("parts", optional=True)
+    top.end()
+    setup = Setup(
+        _robot(robot, folder),
+        _made(workspace, WorkspaceSetup, lower=np.array, upper=np.array, table_height=float),
+        {name: _camera(cameras.table(name)) for name in cameras.names()},
+        _gripper(gripper) if gripper.names() else None,
+        _made(limits, Limits, speed=float, turn=float, joint_speed=float),
+        {name: _made(parts.table(name), Part, size=np.array, T_gripper_part=_pose) for name in parts.names()},
+    )
+    return setup
+
+
+def to_dict(setup: Setup) -> dict[str, Any]:
+    """What stands in a file, of plain values."""
+    robot, gripper = setup.robot, setup.gripper
+    fields: dict[str, Any] = {
+        "robot": {
+            "model": robot.model,
+            "home": robot.home.tolist(),
+            "T_world_base": _plain_pose(robot.T_world_base),
+        }
+    }
+    if robot.joints:
+        fields["robot"]["joints"] = list(robot.joints)
+    if gripper is not None:
+        fields["gripper"] = {
+            "stroke": gripper.stroke,
+            "tip": gripper.tip.tolist(),
+            "approach": gripper.approach.tolist(),
+            "closing": gripper.closing.tolist(),
+            "flange": gripper.flange,
+            "fingers": {name: list(both) for name, both in gripper.fingers.items()},
+        }
+    workspace, limits = setup.workspace, setup.limits
+    fields["workspace"] = {
+        "lower": workspace.lower.tolist(),
+        "upper": workspace.upper.tolist(),
+        "table_height": workspace.table_height,
+    }
+    fields["limits"] = {"speed": limits.speed, "turn": limits.turn, "joint_speed": limits.joint_speed}
+    fields["cameras"] = {name: _plain_camera(camera) for name, camera in setup.cameras.items()}
+    if setup.parts:
+        fields["parts"] = {
+            name: {"size": part.size.tolist(), "T_gripper_part": _plain_pose(part.T_gripper_part)}
+            for name, part in setup.parts.items()
+        }
+    return fields
+
+
+class _Table:
+    """A table of the file, whose fields are taken one by one."""
+
+    def __init__(self, name: str, fields: Any):
+        if not isinstance(fields, Mapping):
+            raise InvalidInput(name or "file", f"{type(fields).__name__}", "a table of named values")
+        self.name, self._fields, self._known = name, dict(fields), list[str]()
+
+    def field(self, name: str) -> str:
+        """How errors call a field."""
+        return f"{self.name}.{name}" if self.name else name
+
+    def names(self) -> list[str]:
+        """Of all fields."""
+        return list(self._fields)
+
+    def take(self, name: str, read_value: Callable[[Any], T], accepted: str = "") -> Any:
+        """The value of a field, or `_MISSING`."""
+        self._known.append(name)
+        value = self._fields.pop(name, _MISSING)
+        if value is _MISSING:
+            return _MISSING
+        try:
+            return read_value(value)
+        except InvalidInput as error:
+            inside = "" if error.field in (name, "pose", "intrinsics") else f".{error.field}"
+            raise InvalidInput(self.field(name) + inside, error.problem, error.accepted) from error
+        except (TypeError, ValueError) as error:
+            raise InvalidInput(self.field(name), f"{value!r}", accepted or "a number or numbers") from error
+
+    def table(self, name: str, optional: bool = False) -> "_Table":
+        """The table in a field, empty if it is missing and that is allowed."""
+        self._known.append(name)
+        value = self._fields.pop(name, {} if optional else _MISSING)
+        if value is _MISSING:
+            raise InvalidInput(self.field(name), "missing", f"a table [{self.field(name)}]")
+        return _Table(self.field(name), value)
+
+    def end(self) -> None:
+        """Refuse what nobody took."""
+        for name in self._fields:
+            raise InvalidInput(self.field(name), "unknown", ", ".join(self._known))
+
+
+def _made(table: _Table, kind: Callable[..., T], **readers: Callable[[Any], Any]) -> T:
+    """An object of the fields of a table, without those that are missing."""
+    values = {
+        name: table.take(name, read_value, _accepted(read_value)) for name, read_value in readers.items()
+    }
+    table.end()
+    given = {name: value for name, value in values.items() if value is not _MISSING}
+    try:
+        return kind(**given)
+    except InvalidInput as error:
+        inside = error.field.startswith(f"{table.name}.")
+        field = error.field if inside else table.field(error.field)
+        raise InvalidInput(field, error.problem, error.accepted) from error
+    except TypeError as error:
+        lacking = [name for name in readers if f"'{name}'" in str(error)]
+        if not lacking:
+            raise
+        accepted = _accepted(readers[lacking[0]]) or "a value"
+        raise InvalidInput(table.field(lacking[0]), "missing", accepted) from error
+
+
+def _robot(table: _Table, folder: Path) -> RobotSetup:
+    def model(value: Any) -> str:
+        return str((folder / value).resolve()) if str(value).endswith((".xml", ".urdf")) else _text(value)
+
+    return _made(table, RobotSetup, model=model, home=np.array, T_world_base=_pose, joints=_names)
+
+
+def _gripper(table: _Table) -> GripperSetup:
+    return _made(
+        table,
+        GripperSetup,
+        stroke=float,
+        tip=np.array,
+        approach=np.array,
+        closing=np.array,
+        flange=_text,
+        fingers=dict,
+    )
+
+
+def _camera(table: _Table) -> CameraSetup:
+    return _made(
+        table,
+        CameraSetup,
+        intrinsics=_intrinsics,
+        size=tuple,
+        T_world_camera=_pose,
+        T_gripper_camera=_pose,
+        seen_as=_text,
+    )
+
+
+def _accepted(read_value: Callable[[Any], Any]) -> str:
+    known: dict[Any, str] = {
+        _pose: _POSE,
+        _intrinsics: _INTRINSICS,
+        _text: "a text",
+        _names: "a list of names",
+        float: "a number",
+        tuple: "[width, height] in pixels",
+        np.array: "a list of numbers",
+        dict: "a table of joints, each with [closed, open]",
+    }
+    return known.get(read_value, "")
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError
+    return value
+
+
+def _names(value: Any) -> tuple[str, ...]:
+    if not isinstance(value, list):
+        raise TypeError
+    return tuple(_text(one) for one in value)
+
+
+def _pose(value: Any) -> FloatArray:
+    if not isinstance(value, Mapping):
+        return as_pose("pose", value)
+    table = _Table("", value)
+    position = table.take("position", lambda p: as_finite("position", p, (3,)))
+    quaternion = table.take("quaternion", lambda q: as_finite("quaternion", q, (4,)))
+    table.end()
+    if position is _MISSING or quaternion is _MISSING:
+        raise InvalidInput("pose", f"only {', '.join(value) or 'nothing'}", _POSE)
+    return se3.from_pose7(np.concatenate([position, quaternion]))
+
+
+def _intrinsics(value: Any) -> FloatArray:
+    if not isinstance(value, Mapping):
+        return as_finite("intrinsics", value, (3, 3))
+    table = _Table("", value)
+    found = [table.take(name, float, "pixels") for name in ("fx", "fy", "cx", "cy")]
+    table.end()
+    if _MISSING in found:
+        raise InvalidInput("intrinsics", f"only {', '.join(value) or 'nothing'}", _INTRINSICS)
+    fx, fy, cx, cy = found
+    return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+
+
+def _plain_pose(T_a_b: FloatArray) -> dict[str, Any]:
+    pose = se3.to_pose7(T_a_b)
+    return {"position": pose[:3].tolist(), "quaternion": pose[3:].tolist()}
+
+
+def _plain_camera(camera: CameraSetup) -> dict[str, Any]:
+    K = camera.intrinsics
+    fields: dict[str, Any] = {
+        "size": list(camera.size),
+        "intrinsics": {"fx": K[0, 0], "fy": K[1, 1], "cx": K[0, 2], "cy": K[1, 2]},
+    }
+    fields["intrinsics"] = {name: float(value) for name, value in fields["intrinsics"].items()}
+    for name in ("T_world_camera", "T_gripper_camera"):
+        if getattr(camera, name) is not None:
+            fields[name] = _plain_pose(getattr(camera, name))
+    return fields | ({"seen_as": camera.seen_as} if camera.seen_as else {})
+
+
+def _format(path: Path) -> Any:
+    found = {".toml": tomllib, ".json": json}.get(path.suffix)
+    if found is None:
+        raise InvalidInput("setup", f"{path}", "a file that ends in .toml or .json")
+    return found
+
+
+def _toml(fields: Mapping[str, Any]) -> str:
+    """Tables of values, and tables of such tables (cameras, parts), as TOML."""
+    lines: list[str] = []
+    for name, table in fields.items():
+        nested = name in ("cameras", "parts")
+        for title, values in [(f"{name}.{n}", t) for n, t in table.items()] if nested else [(name, table)]:
+            head, *rest = title.split(".", 1)
+            lines.append("[" + ".".join([head, *(json.dumps(n, ensure_ascii=False) for n in rest)]) + "]")
+            lines += [f"{key} = {_value(value)}" for key, value in values.items()] + [""]
+    return "\n".join(lines)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{json.dumps(k)} = {_value(v)}" for k, v in value.items()) + "}"
+    # Texts, numbers and lists of them are written alike in JSON and TOML.
+    return json.dumps(value, ensure_ascii=False)
