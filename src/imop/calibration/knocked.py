@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from imop.calibration.calibrate import Prepared, moving_cameras, prepare
 from imop.calibration.diagnose import diagnose
@@ -15,8 +16,8 @@ from imop.geometry import se3
 
 FAR = 2.5, 0.5
 """Millimetres and degrees from which a camera was moved; half of the knocks that have to be noticed."""
-SURE = 3.0
-"""Standard deviations by which it has to have moved."""
+CHANCE = 40.0
+"""Squared Mahalanobis distance (six degrees of freedom) from which a motion is no chance; 28 is one in 10,000."""
 ENOUGH = 6
 """Pictures with which the board may have been fixed anew meanwhile."""
 
@@ -28,25 +29,28 @@ class Moved:
     Attributes:
         millimetres: between its positions.
         degrees: between its rotations.
-        millimetres_off: standard error of `millimetres`.
-        degrees_off: standard error of `degrees`.
+        millimetres_off: standard error of its position.
+        degrees_off: of its rotation.
+        chance: squared Mahalanobis distance of the motion, six degrees of freedom.
+        unnoticed: millimetres of a shift in the least visible direction that could pass for chance.
     """
 
     millimetres: float
     degrees: float
     millimetres_off: float
     degrees_off: float
+    chance: float
+    unnoticed: float
 
     @property
     def knocked(self) -> bool:
-        """Whether it moved by more than `FAR`, and by more than chance."""
-        by_distance = self.millimetres > max(FAR[0], SURE * self.millimetres_off)
-        return by_distance or self.degrees > max(FAR[1], SURE * self.degrees_off)
+        """Whether it moved by more than `FAR`, and not by chance."""
+        return self.chance > CHANCE and (self.millimetres > FAR[0] or self.degrees > FAR[1])
 
     @property
     def unsure(self) -> bool:
-        """Whether a knock of twice `FAR` may be overlooked."""
-        return SURE * self.millimetres_off > 2 * FAR[0] or SURE * self.degrees_off > 2 * FAR[1]
+        """Whether a shift by twice `FAR` could pass for chance."""
+        return self.unnoticed > 2 * FAR[0]
 
 
 def moved_since(calibration: Calibration, series: Series) -> tuple[dict[str, Moved], list[Problem]]:
@@ -106,14 +110,26 @@ def _determined(prepared: Prepared) -> bool:
 
 def _moved(calibration: Calibration, refined: Refined, name: str) -> Moved:
     before, now = calibration.cameras[name], refined.poses.cameras[name]
-    at = 6 * list(refined.poses.cameras).index(name)
-    variance = np.diag(refined.covariance)[at : at + 6]
     known = before.quality
+    at = 6 * list(refined.poses.cameras).index(name)
+    block = np.s_[at : at + 6, at : at + 6]
+    # A few pictures do not tell how much they scatter; those of the calibration did.
+    noise = known.common * max(known.corner_pixels, refined.deviation) ** 2
+    covariance = noise * refined.independent[block]
+    calibrated = np.repeat([np.radians(known.degrees_off), known.millimetres_off / 1000], 3) ** 2 / 3
+    covariance = covariance + np.diag(calibrated)
+    T = se3.invert(before.T_mount_camera) @ now
+    twist = np.concatenate([Rotation.from_matrix(T[:3, :3]).as_rotvec(), T[:3, 3]])
+    information = np.linalg.inv(covariance)
+    least = float(np.linalg.eigvalsh(information[3:, 3:])[0])
+    variance = np.diag(covariance)
     return Moved(
-        1000 * float(se3.translation_distance(before.T_mount_camera, now)),
-        float(np.degrees(se3.rotation_distance(before.T_mount_camera, now))),
-        float(np.hypot(1000 * np.sqrt(variance[3:].sum()), known.millimetres_off)),
-        float(np.hypot(np.degrees(np.sqrt(variance[:3].sum())), known.degrees_off)),
+        1000 * float(np.linalg.norm(twist[3:])),
+        float(np.degrees(np.linalg.norm(twist[:3]))),
+        1000 * float(np.sqrt(variance[3:].sum())),
+        float(np.degrees(np.sqrt(variance[:3].sum()))),
+        float(twist @ information @ twist),
+        1000 * float(np.sqrt(CHANCE / least)),
     )
 
 

@@ -131,12 +131,22 @@ def find_quality(
             float(np.sqrt((n - 1) / n * np.sum(turns**2))),
             float(shifts.max()),
             float(turns.max()),
+            refined.deviation,
+            _common(refined, name),
         )
         if quality.millimetres_off > PRECISE[0] or quality.degrees_off > PRECISE[1]:
             problem = f"its pose is known to {quality.millimetres_off:.1f} mm and {quality.degrees_off:.2f} degrees only"
             remedy = "take more pictures, nearer to the board, with the hand turned about two axes; check the robot's poses"
             problems.append(Problem("imprecise", "warning", f"camera {name}", problem, remedy))
     return found, problems
+
+
+def _common(refined: Refined, name: str) -> float:
+    at = 6 * list(refined.poses.cameras).index(name)
+    block = np.s_[at : at + 6, at : at + 6]
+    independent = refined.deviation**2 * refined.independent[block]
+    # Both in the units of the one, so that turns and shifts count alike.
+    return max(1.0, float(np.trace(np.linalg.solve(independent, refined.covariance[block]))) / 6)
 
 
 def _millimetres(series: Series, seen: Mapping[int, FloatArray], poses: Poses, name: str) -> float:

@@ -39,6 +39,8 @@ class Refined:
         scale: of the board: 1.02 if its squares are two percent larger than said; 1 if that was not asked.
         errors: camera -> (N, 2) pixels that corners lie from where they should, in the order of `seen_by`.
         shot: camera -> (N,) number of the shot of each.
+        deviation: of a coordinate of a corner, pixels, robust.
+        independent: (n, n) as `covariance`, if the corners of a picture erred independently by a pixel.
         covariance: (n, n) of the turns (radians) and shifts (metres) of the cameras in their own frames, six each in the order of
             `poses.cameras`, then the board's, then of the scale's logarithm, as far as they were free.
     """
@@ -47,6 +49,8 @@ class Refined:
     scale: float
     errors: Mapping[str, FloatArray]
     shot: Mapping[str, IntArray]
+    deviation: float
+    independent: FloatArray
     covariance: FloatArray
 
     def rms(self, camera: str | None = None) -> float:
@@ -148,12 +152,16 @@ def refine(
     poses, scale = _moved_poses(start, spread(found.x))
     ends = np.cumsum([0, *(2 * len(camera.shot) for camera in seen)])
     off, J = errors(spread(found.x))
+    shot = np.concatenate([np.repeat(camera.shot, 2) for camera in seen])
+    independent, covariance = _covariances(off, J[:, free], shot)
     return Refined(
         poses,
         scale,
         {name: off[a:b].reshape(-1, 2) for name, a, b in zip(names, ends, ends[1:], strict=False)},
         {name: camera.shot for name, camera in zip(names, seen, strict=True)},
-        _covariance(off, J[:, free], np.concatenate([np.repeat(camera.shot, 2) for camera in seen])),
+        float(1.4826 * np.median(np.abs(off))),
+        independent,
+        covariance,
     )
 
 
@@ -189,19 +197,18 @@ def _cross(v: FloatArray) -> FloatArray:
     return C
 
 
-def _covariance(errors: FloatArray, J: FloatArray, shot: IntArray) -> FloatArray:
-    """Of the parameters by the scatter from shot to shot: errors of the robot act on all corners of one.
+def _covariances(errors: FloatArray, J: FloatArray, shot: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Of the parameters, for independent errors of a pixel, and by the scatter from shot to shot.
 
-    The sandwich of White (1980) with shots as clusters; `shot` is the number of each row's.
+    The second is White's (1980) with shots as clusters, for errors of the robot act on all corners of one; `shot` is the number
+    of each row's.
     """
     weight = (1 + (errors / OUTLIER) ** 2) ** -0.5
     bread = np.linalg.pinv((J * weight[:, None]).T @ J)
-    scores = np.stack(
-        [(J[shot == i] * (weight * errors)[shot == i, None]).sum(axis=0) for i in np.unique(shot)]
-    )
+    scores = np.stack([(J[shot == i] * (weight * errors)[shot == i, None]).sum(axis=0) for i in np.unique(shot)])
     # Each shot tells six numbers of the pose of the board.
     many = 6 * len(scores)
-    return np.asarray(bread @ scores.T @ scores @ bread * many / max(many - J.shape[1], 1))
+    return bread, np.asarray(bread @ scores.T @ scores @ bread * many / max(many - J.shape[1], 1))
 
 
 def _seen(series: Series, name: str, pictures: Mapping[int, Corners], used: set[int]) -> _Seen:

@@ -35,6 +35,9 @@ class Quality:
         degrees_off: that of its rotation.
         spread_millimetres: how far the position moves at most if one picture is left out.
         spread_degrees: how far the rotation does.
+        corner_pixels: standard deviation of a coordinate of a corner.
+        common: by how many times errors that all corners of a picture have in common, such as the robot's, make the
+            pose's variance larger than independent errors of the corners would.
     """
 
     pictures: int
@@ -46,6 +49,8 @@ class Quality:
     degrees_off: float
     spread_millimetres: float
     spread_degrees: float
+    corner_pixels: float
+    common: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,11 +102,12 @@ class Calibration:
 
 
 def save_calibration(calibration: Calibration, path: Path) -> None:
-    """Write the JSON file that a Setup file includes."""
+    """Write a JSON file, whose table `cameras` is that of a set-up file (`imop.setup`)."""
     content = {
         "format": FORMAT,
         "version": 1,
         "cameras": {name: _camera_fields(calibration, name) for name in calibration.cameras},
+        "distortion": {name: c.camera.distortion.tolist() for name, c in calibration.cameras.items()},
         "T_world_base": _pose_fields(calibration.T_world_base),
         "board": asdict(calibration.board),
         "board_on": calibration.board_on,
@@ -127,7 +133,7 @@ def load_calibration(path: Path) -> Calibration:
         cameras = {}
         for name, fields in content["cameras"].items():
             quality = Quality(**content["quality"][name])
-            cameras[name] = _camera_of(fields, T_world_base, quality)
+            cameras[name] = _camera_of(fields, content["distortion"][name], T_world_base, quality)
         return Calibration(
             cameras,
             Board(**content["board"]),
@@ -159,22 +165,24 @@ def _camera_fields(calibration: Calibration, name: str) -> dict[str, Any]:
     on_hand = camera.mount == "hand"
     T = found.T_mount_camera if on_hand else calibration.T_world_base @ found.T_mount_camera
     return {
-        "width": camera.width,
-        "height": camera.height,
-        "fx": K[0, 0],
-        "fy": K[1, 1],
-        "cx": K[0, 2],
-        "cy": K[1, 2],
-        "distortion": camera.distortion.tolist(),
+        "intrinsics": {"fx": K[0, 0], "fy": K[1, 1], "cx": K[0, 2], "cy": K[1, 2]},
+        "size": [camera.width, camera.height],
         "T_gripper_camera" if on_hand else "T_world_camera": _pose_fields(T),
     }
 
 
-def _camera_of(fields: Mapping[str, Any], T_world_base: FloatArray, quality: Quality) -> CalibratedCamera:
+def _camera_of(
+    fields: Mapping[str, Any], distortion: Sequence[float], T_world_base: FloatArray, quality: Quality
+) -> CalibratedCamera:
     mount: Mount = "hand" if "T_gripper_camera" in fields else "world"
-    K = np.array([[fields["fx"], 0, fields["cx"]], [0, fields["fy"], fields["cy"]], [0, 0, 1]])
-    camera = RigCamera(mount, fields["width"], fields["height"], K, np.array(fields["distortion"]))
+    width, height = fields["size"]
+    camera = RigCamera(mount, width, height, intrinsics_of(fields["intrinsics"]), np.array(distortion))
     if mount == "hand":
         return CalibratedCamera(camera, pose_of(fields["T_gripper_camera"]), quality)
     T = se3.invert(T_world_base) @ pose_of(fields["T_world_camera"])
     return CalibratedCamera(camera, T, quality)
+
+
+def intrinsics_of(fields: Mapping[str, Any]) -> FloatArray:
+    """(3, 3) of fields fx, fy, cx, cy, pixels."""
+    return np.array([[fields["fx"], 0, fields["cx"]], [0, fields["fy"], fields["cy"]], [0, 0, 1]], dtype=np.float64)

@@ -9,17 +9,12 @@ import numpy as np
 from imop.calibration.board import Board
 from imop.errors import InvalidInput
 from imop.geometry import se3
-from imop.types import FloatArray, IntArray, as_array, as_finite, as_pose
+from imop.types import FloatArray, IntArray, as_array, as_finite, as_intrinsics, as_pose, freeze
 
 Mount = Literal["world", "hand"]
 """A camera that stands beside the robot, or one that moves with its hand."""
 BoardPlace = Literal["hand", "table"]
 """A board that the hand holds, or one that lies still."""
-
-
-def _set(instance: object, **values: object) -> None:
-    for name, value in values.items():
-        object.__setattr__(instance, name, value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,15 +43,13 @@ class RigCamera:
         distortion = as_finite("distortion", self.distortion, (None,))
         if len(distortion) not in (0, 4, 5, 8, 12, 14):
             raise InvalidInput("distortion", f"{len(distortion)} coefficients", "0, 4, 5, 8, 12 or 14")
-        _set(self, distortion=distortion)
+        freeze(self, distortion=distortion)
         if self.intrinsics is not None:
-            _set(self, intrinsics=_checked_intrinsics(self.intrinsics, self.width, self.height))
+            freeze(self, intrinsics=_checked_intrinsics(self.intrinsics, self.width, self.height))
 
 
 def _checked_intrinsics(given: FloatArray, width: int, height: int) -> FloatArray:
-    K = as_finite("intrinsics", given, (3, 3))
-    if not (K[0, 0] > 0 and K[1, 1] > 0 and np.allclose(K[[1, 2, 2, 2], [0, 0, 1, 2]], (0, 0, 0, 1))):
-        raise InvalidInput("intrinsics", f"{K.tolist()}", "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]], fx, fy > 0")
+    K = as_intrinsics("intrinsics", given)
     centre = K[0, 2] / width, K[1, 2] / height
     if not all(0.25 < share < 0.75 for share in centre):
         problem = (
@@ -82,7 +75,7 @@ class Corners:
 
     def __post_init__(self) -> None:
         ids = as_array("ids", self.ids, (None,), np.int32)
-        _set(self, ids=ids, pixels=as_finite("pixels", self.pixels, (len(ids), 2)))
+        freeze(self, ids=ids, pixels=as_finite("pixels", self.pixels, (len(ids), 2)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +94,7 @@ class Shot:
 
     def __post_init__(self) -> None:
         T = as_pose("T_base_gripper", self.T_base_gripper)
-        _set(self, T_base_gripper=T, corners=dict(self.corners))
+        freeze(self, T_base_gripper=T, corners=dict(self.corners))
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +120,7 @@ class Series:
     def __post_init__(self) -> None:
         if self.board_on not in ("hand", "table"):
             raise InvalidInput("board_on", f"{self.board_on!r}", "hand or table")
-        _set(self, cameras=dict(self.cameras), shots=tuple(self.shots))
+        freeze(self, cameras=dict(self.cameras), shots=tuple(self.shots))
         for name, camera in self.cameras.items():
             if camera.mount == "hand" and self.board_on == "hand":
                 problem = "camera and board are both on the hand, so each picture shows the same"

@@ -17,9 +17,11 @@ INTRINSICS = np.array([[615.0, 0.0, 322.0], [0.0, 615.0, 238.0], [0.0, 0.0, 1.0]
 """As a RealSense D415's colour camera has them at this size."""
 TILT = np.radians(25.0)
 """Standard deviation of how the hand is turned from looking straight, about each axis."""
-_BOARD_CENTRE = np.array([0.5, 0.0, 0.35])
-_CAMERA_BESIDE = np.array([1.15, 0.25, 0.65])
-_CAMERA_ON_HAND = se3.make(se3.euler(x=0.1, z=np.pi / 2), (-0.06, 0.01, -0.09))
+BOARD_MIDDLE = np.array([0.5, 0.0, 0.35])
+"""Where a hand that shows the board is, metres in the frame of the arm's base."""
+CAMERAS_BESIDE = {"left": np.array([1.15, 0.25, 0.65]), "right": np.array([1.1, -0.35, 0.6])}
+"""Where cameras beside the robot are, metres in the frame of the arm's base."""
+CAMERA_ON_HAND = se3.make(se3.euler(x=0.1, z=np.pi / 2), (-0.06, 0.01, -0.09))
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ def random_truth(rng: np.random.Generator, mount: Mount, board: Board | None = N
     board = board or Board()
     middle = np.array([board.size[0] / 2, board.size[1] / 2, 0.0])
     if mount == "world":
-        T_camera = se3.make(_looking(_BOARD_CENTRE - _CAMERA_BESIDE), _CAMERA_BESIDE)
+        T_camera = se3.make(looking(BOARD_MIDDLE - CAMERAS_BESIDE["left"]), CAMERAS_BESIDE["left"])
         # The gripper holds the board before its fingers, its face forward: the board's z looks back.
         T_gripper_board = se3.make(se3.euler(x=np.pi), (0.0, 0.0, 0.04)) @ se3.make(p=-middle)
         return Truth(
@@ -92,7 +94,7 @@ def random_truth(rng: np.random.Generator, mount: Mount, board: Board | None = N
         )
     T_base_board = se3.make(se3.euler(x=np.pi), (0.5, 0.0, 0.02)) @ se3.make(p=-middle)
     return Truth(
-        board, mount, _CAMERA_ON_HAND @ _wobble(rng, 0.02, 0.1), T_base_board @ _wobble(rng, 0.05, 0.2)
+        board, mount, CAMERA_ON_HAND @ _wobble(rng, 0.02, 0.1), T_base_board @ _wobble(rng, 0.05, 0.2)
     )
 
 
@@ -132,7 +134,7 @@ def _seen(board: Board, T_camera_board: FloatArray, rng: np.random.Generator, no
     return Corners(np.flatnonzero(inside).astype(np.int32), pixels[inside])
 
 
-def _looking(direction: FloatArray) -> FloatArray:
+def looking(direction: FloatArray) -> FloatArray:
     """(3, 3) of an upright camera that looks along a direction."""
     z = direction / np.linalg.norm(direction)
     x = np.cross(z, (0.0, 0.0, 1.0))
