@@ -12,16 +12,17 @@ _ROUNDS, _TRIED = 4, 10
 
 
 def as_if_radians(T: FloatArray) -> FloatArray:
-    """Poses (N, 4, 4) whose rotation vectors were given in radians and read as degrees, as they were meant."""
+    """What poses (N, 4, 4) were meant to be if their rotation vectors are radians read as degrees."""
     turns = Rotation.from_matrix(T[:, :3, :3]).as_rotvec()
     return se3.make(Rotation.from_rotvec(np.degrees(turns)).as_matrix(), T[:, :3, 3])
 
 
 def as_if_degrees(A: FloatArray, T: FloatArray, series: Series, camera: str) -> FloatArray:
-    """Poses (N, 4, 4) whose rotation vectors were given in degrees and read as radians, as they may have been meant.
+    """What poses (N, 4, 4) may have been meant to be if their rotation vectors are degrees read as radians.
 
-    Whole turns are lost by reading, so what was meant is one of some sixty rotations about the same axis. Those are taken that turn
-    from shot to shot as the board does before the camera, T_camera_board (N, 4, 4) in `A`; they are right only if they fit.
+    Whole turns are lost by reading, so what was meant is one of some sixty rotations about the same axis.
+    Those are taken that turn from shot to shot as the board does before the camera, T_camera_board (N, 4, 4)
+    in `A`; they are right only if they fit.
     """
     options = _options(T)
     turned = _angles(A[0], A)

@@ -35,8 +35,8 @@ _QUIET = 0.5
 class Board:
     """A ChArUco board as OpenCV 4.6 and later draw it.
 
-    The board's frame: origin at the outer corner of the first square, x along the row to the right, y down, z into the
-    paper, so a camera that looks straight at an upright board has its own axes.
+    The board's frame: origin at the outer corner of the first square, x along the row to the right, y down, z
+    into the paper, so a camera that looks straight at an upright board has its own axes.
 
     Attributes:
         columns: squares in a row, at least 3.
@@ -51,8 +51,8 @@ class Board:
 
     columns: int = 8
     rows: int = 6
-    square: float = 0.03
-    marker: float = 0.022
+    square: float = 0.028
+    marker: float = 0.021
     dictionary: str = "DICT_4X4_50"
 
     def __post_init__(self) -> None:

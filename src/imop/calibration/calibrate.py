@@ -10,7 +10,7 @@ from imop.calibration.diagnose import ENOUGH, diagnose
 from imop.calibration.intrinsics import FOCAL_OFF, INTRINSICS_REMEDY, found_intrinsics, intrinsics_problem
 from imop.calibration.problems import NotCalibrated, Problem
 from imop.calibration.quality import find_quality, shot_problems, size_problem
-from imop.calibration.refine import Poses, Refined, refine
+from imop.calibration.refine import Poses, refine
 from imop.calibration.result import CalibratedCamera, Calibration
 from imop.calibration.series import Corners, Series
 from imop.calibration.solvers import mean_pose, starts
@@ -81,7 +81,7 @@ def prepare(series: Series) -> Prepared:
 
 
 def start_poses(prepared: Prepared) -> Poses:
-    """Poses by OpenCV's solvers: of all their solutions the one that puts the corners nearest to where they were seen."""
+    """The solution of OpenCV's solvers that puts the corners nearest to where they were seen."""
     series = prepared.series
     best: tuple[float, FloatArray] | None = None
     for name in moving_cameras(series):
@@ -165,7 +165,7 @@ def _wrong_intrinsics(prepared: Prepared, name: str) -> list[Problem]:
     A = np.stack([board_pose(series.board, c, found) for c in prepared.pictures[name].values()])
     if abs(found[0, 0] / given - 1) < FOCAL_OFF or _misfit(diagnose(series, name, numbers, A)):
         return []
-    problem = f"pictures and poses fit with a focal length of {found[0, 0]:.0f} px, not with {given:.0f} px as given"
+    problem = f"all fits with a focal length of {found[0, 0]:.0f} px, not with {given:.0f} px as given"
     return [Problem("intrinsics", "error", f"camera {name}", problem, INTRINSICS_REMEDY)]
 
 

@@ -120,8 +120,8 @@ def proposed_poses(
         T_base_gripper: (4, 4) where the board is seen well.
         rng: chooses.
         n: how many.
-        ahead: metres before the fingers to the point about which the hand turns; for a camera on the hand about
-            the board's distance, so that it stays in the picture.
+        ahead: metres before the fingers to the point about which the hand turns; for a camera on the hand
+            about the board's distance, so that it stays in the picture.
     """
     to_pivot = se3.make(p=(0.0, 0.0, ahead))
     poses = []

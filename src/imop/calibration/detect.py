@@ -1,10 +1,11 @@
-"""From a picture to the corners of the board in it, and from corners to the board's pose before the camera."""
+"""From a picture to the corners of the board in it, and from corners to where the board is."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from imop.calibration.board import Board
+from imop.calibration.refine import moved
 from imop.calibration.series import Corners
 from imop.errors import InvalidInput
 from imop.extras import extra
@@ -38,7 +39,9 @@ def detect_corners(board: Board, rgb: ByteArray) -> Corners | None:
     pixels, ids, _, _ = detector.detectBoard(grey)
     if ids is None or len(ids) < FEW:
         return None
-    return Corners(np.asarray(ids).ravel(), np.asarray(pixels, dtype=np.float64).reshape(-1, 2))
+    return Corners(
+        np.asarray(ids, dtype=np.int32).ravel(), np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+    )
 
 
 def undistorted(corners: Corners, intrinsics: FloatArray, distortion: FloatArray) -> Corners:
@@ -48,7 +51,7 @@ def undistorted(corners: Corners, intrinsics: FloatArray, distortion: FloatArray
     with extra("calibrate"):
         import cv2
     pixels = cv2.undistortPoints(corners.pixels[:, None], intrinsics, distortion, P=intrinsics)
-    return replace(corners, pixels=np.asarray(pixels).reshape(-1, 2))
+    return replace(corners, pixels=np.asarray(pixels, dtype=np.float64).reshape(-1, 2))
 
 
 def board_pose(board: Board, corners: Corners, intrinsics: FloatArray) -> FloatArray:
@@ -73,7 +76,7 @@ def board_pose(board: Board, corners: Corners, intrinsics: FloatArray) -> FloatA
     poses = []
     for turn, shift in zip(turns, shifts, strict=True):
         turn, shift = cv2.solvePnPRefineLM(points, corners.pixels, intrinsics, None, turn, shift)
-        poses.append(se3.make(np.asarray(cv2.Rodrigues(turn)[0]), np.asarray(shift).ravel()))
+        poses.append(moved(np.concatenate([turn, shift], dtype=np.float64).ravel()))
     errors = [np.square(project(T, points, intrinsics) - corners.pixels).sum() for T in poses]
     return poses[int(np.argmin(errors))]
 

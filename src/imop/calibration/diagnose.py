@@ -1,4 +1,4 @@
-"""Why pictures and robot poses do not fit: known mistakes are tried, and the one that makes them fit is named."""
+"""Why pictures and robot poses do not fit: known mistakes are tried, and the right one is named."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -87,11 +87,12 @@ def _few(where: str, n: int) -> list[Problem]:
 
 
 def spread_of_turns(T: FloatArray) -> FloatArray:
-    """(3,) standard deviations of the turns between poses (N, 4, 4) along their principal axes, radians, largest first."""
+    """(3,) standard deviations of turns (N, 4, 4) along their principal axes, radians, largest first."""
     i, j = np.triu_indices(len(T), 1)
     turns = Rotation.from_matrix(T[i, :3, :3] @ np.swapaxes(T[j, :3, :3], -1, -2)).as_rotvec()
     # Pairs differ by twice the variance of single poses.
-    return np.sqrt(np.maximum(np.linalg.eigvalsh(turns.T @ turns / len(turns) / 2), 0.0))[::-1]
+    variances = np.linalg.eigvalsh(turns.T @ turns / len(turns) / 2)
+    return np.asarray(np.sqrt(np.maximum(variances, 0.0))[::-1], dtype=np.float64)
 
 
 def _alike(where: str, A: FloatArray) -> list[Problem]:
@@ -100,11 +101,11 @@ def _alike(where: str, A: FloatArray) -> list[Problem]:
         return []
     limit = f"{np.degrees(TURNED):.0f} degrees"
     if first < np.degrees(TURNED):
-        problem = f"the board hardly turns before the camera ({first:.1f} degrees, standard deviation; {limit} are needed)"
+        problem = f"the board hardly turns ({first:.1f} degrees, standard deviation; {limit} are needed)"
     else:
         problem = (
-            f"the board turns about one axis only ({first:.1f} degrees about it, {second:.1f} about the others; "
-            f"{limit} are needed about two)"
+            f"the board turns about one axis only ({first:.1f} degrees, {second:.1f} about the others, "
+            f"standard deviation; {limit} are needed about two)"
         )
     remedy = "turn the hand by 20 to 40 degrees about two different axes between the pictures"
     return [Problem("alike", "error", where, problem, remedy)]
@@ -162,8 +163,8 @@ def _off(fit: Fit) -> str:
 
 
 UNEXPLAINED = (
-    "see that every picture belongs to its pose, that poses are T_base_gripper with rotations in radians, that the board cannot "
-    "slip in the hand or on the table, and that nobody moved camera or base meanwhile"
+    "see that every picture belongs to its pose, that poses are T_base_gripper with rotations in radians, "
+    "that the board cannot slip in the hand or on the table, and that nobody moved camera or base meanwhile"
 )
 
 
@@ -184,7 +185,7 @@ def _readings(series: Series, camera: str, A: FloatArray, T: FloatArray) -> list
 
 
 def _inverted(series: Series, camera: str, A: FloatArray, T: FloatArray) -> tuple[str, str]:
-    """Inverted poses, and a camera that is mounted elsewhere, give the same equation; lengths tell them apart."""
+    """Inverted poses and a camera mounted elsewhere are the same equation; lengths tell them apart."""
     fit = fit_scaled(A, series.motion(camera, se3.invert(T)))
     on_hand = series.cameras[camera].mount == "hand"
     # What is on the hand is near the gripper; what is not is at arm's length from the base.

@@ -10,6 +10,7 @@ docs/real_robot/calibration.md shows series.json.
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from imop.calibration.board import Board
 from imop.calibration.detect import detect_corners
-from imop.calibration.result import intrinsics_of
+from imop.calibration.result import Calibration, intrinsics_of
 from imop.calibration.series import BoardPlace, RigCamera, Series, Shot
 from imop.cameras.interfaces import Frame
 from imop.demos.images import read_rgb
@@ -27,7 +28,16 @@ from imop.errors import CorruptData, InvalidInput
 from imop.files import read, replaced
 from imop.geometry import se3
 from imop.robots.interfaces import RobotState
-from imop.types import ByteArray, Float32Array, FloatArray, as_finite, as_pose, freeze
+from imop.types import (
+    ByteArray,
+    CameraView,
+    Float32Array,
+    FloatArray,
+    Observation,
+    as_finite,
+    as_pose,
+    freeze,
+)
 
 FORMAT = "imop-calibration-series"
 NAME = "series.json"
@@ -94,7 +104,9 @@ class Recording:
         image = read_rgb(path)
         if image.shape[:2] != (known.height, known.width):
             problem = f"{path} has {image.shape[1]} x {image.shape[0]} pixels"
-            raise InvalidInput(f"cameras.{camera}.size", problem, f"{known.width} x {known.height}, as {NAME} says")
+            raise InvalidInput(
+                f"cameras.{camera}.size", problem, f"{known.width} x {known.height}, as {NAME} says"
+            )
         return image
 
     def depth(self, shot: int, camera: str) -> Float32Array | None:
@@ -129,6 +141,22 @@ class Recording:
             shots.append(Shot(recorded.T_base_gripper, corners, recorded.name))
         return Series(self.board, self.board_on, self.cameras, shots)
 
+    def observations(self, calibration: Calibration) -> list[Observation]:
+        """What was seen at each shot with depth images, with the poses of a calibration."""
+        found = []
+        for i, shot in enumerate(self.shots):
+            views = {}
+            for name in shot.images:
+                depth, known = self.depth(i, name), calibration.cameras.get(name)
+                if depth is not None and known is not None and known.camera.intrinsics is not None:
+                    T = calibration.T_world_camera(name, shot.T_base_gripper)
+                    views[name] = CameraView(self.rgb(i, name), depth, known.camera.intrinsics, T)
+            if views:
+                T_world_gripper = calibration.T_world_base @ shot.T_base_gripper
+                opening, q = shot.gripper_opening, shot.joint_positions
+                found.append(Observation(views, T_world_gripper, opening, i, q))
+        return found
+
     def with_shot(self, state: RobotState, frames: Mapping[str, Frame]) -> "Recording":
         """Write one more shot: its pictures first, then series.json."""
         number = len(self.shots)
@@ -139,7 +167,9 @@ class Recording:
                 Image.fromarray(frame.rgb).save(temporary, format="PNG")
             steps = np.nan_to_num(frame.depth / DEPTH_STEP, nan=0.0, posinf=0.0, neginf=0.0)
             with replaced(self.folder / depths[name]) as temporary:
-                Image.fromarray(np.clip(np.round(steps), 0, 65535).astype(np.uint16)).save(temporary, format="PNG")
+                Image.fromarray(np.clip(np.round(steps), 0, 65535).astype(np.uint16)).save(
+                    temporary, format="PNG"
+                )
         shot = Recorded(state.T_base_gripper, images, depths, state.joint_positions, state.gripper_opening)
         recording = replace(self, shots=(*self.shots, shot))
         recording.write()
@@ -174,11 +204,10 @@ def read_recording(folder: Path) -> Recording:
     if not isinstance(content, dict) or content.get("format") != FORMAT or content.get("version") != 1:
         raise CorruptData(path, f'does not begin with "format": "{FORMAT}" and "version": 1', _REMEDY)
     board = _parsed("board", lambda: Board(**content["board"]))
-    cameras = {}
-    for name, fields in _parsed("cameras", lambda: dict(content["cameras"])).items():
-        cameras[name] = _parsed(f"cameras.{name}", lambda fields=fields: _camera(fields))
+    described = _parsed("cameras", lambda: dict(content["cameras"]))
+    cameras = {name: _parsed(f"cameras.{name}", partial(_camera, these)) for name, these in described.items()}
     listed = _parsed("shots", lambda: list(content["shots"]))
-    shots = [_parsed(f"shots[{i}]", lambda shot=shot: _shot(shot, cameras)) for i, shot in enumerate(listed)]
+    shots = [_parsed(f"shots[{i}]", partial(_shot, these, cameras)) for i, these in enumerate(listed)]
     return Recording(folder, board, content.get("board_on", ""), cameras, shots)
 
 
@@ -197,7 +226,9 @@ def _parsed(field: str, parse: Callable[[], Any]) -> Any:
 def _camera(fields: Mapping[str, Any]) -> RigCamera:
     width, height = fields["size"]
     K = intrinsics_of(fields["intrinsics"]) if fields.get("intrinsics") else None
-    return RigCamera(fields["mount"], width, height, K, np.array(fields.get("distortion", []), dtype=np.float64))
+    return RigCamera(
+        fields["mount"], width, height, K, np.array(fields.get("distortion", []), dtype=np.float64)
+    )
 
 
 def _camera_fields(camera: RigCamera) -> dict[str, Any]:

@@ -52,8 +52,8 @@ def intrinsics_problem(
         return []
     given, found = camera.intrinsics[0, 0], K[0, 0]
     problem = (
-        f"corners lie {rms:.1f} px off in single pictures with the given intrinsics, {better:.1f} with a focal length of {found:.0f} "
-        f"instead of {given:.0f} px"
+        f"corners lie {rms:.1f} px off in single pictures with the given intrinsics, {better:.1f} with a "
+        f"focal length of {found:.0f} instead of {given:.0f} px"
     )
     return [Problem("intrinsics", "error", f"camera {name}", problem, INTRINSICS_REMEDY)]
 
@@ -75,6 +75,6 @@ def _estimate(
     rms, K, distortion, _, _ = cv2.calibrateCamera(
         points, pixels, (camera.width, camera.height), start, np.zeros(5), flags=flags
     )
-    K = np.asarray(K, dtype=np.float64)
-    K[0, 1] = 0.0
-    return K, np.asarray(distortion, dtype=np.float64).ravel()[:4], float(rms)
+    found: FloatArray = np.array(K, dtype=np.float64)
+    found[0, 1] = 0.0
+    return found, np.asarray(distortion, dtype=np.float64).ravel()[:4], float(rms)

@@ -17,7 +17,7 @@ from imop.geometry import se3
 FAR = 2.5, 0.5
 """Millimetres and degrees from which a camera was moved; half of the knocks that have to be noticed."""
 CHANCE = 40.0
-"""Squared Mahalanobis distance (six degrees of freedom) from which a motion is no chance; 28 is one in 10,000."""
+"""Squared Mahalanobis distance (six degrees of freedom) from which a motion is no chance."""
 ENOUGH = 6
 """Pictures with which the board may have been fixed anew meanwhile."""
 
@@ -42,6 +42,12 @@ class Moved:
     chance: float
     unnoticed: float
 
+    def __str__(self) -> str:
+        return (
+            f"{self.millimetres:.1f} +- {self.millimetres_off:.1f} mm and "
+            f"{self.degrees:.2f} +- {self.degrees_off:.2f} degrees from where it was calibrated"
+        )
+
     @property
     def knocked(self) -> bool:
         """Whether it moved by more than `FAR`, and not by chance."""
@@ -56,8 +62,8 @@ class Moved:
 def moved_since(calibration: Calibration, series: Series) -> tuple[dict[str, Moved], list[Problem]]:
     """How far the cameras that see the board in a new series are from where they were calibrated.
 
-    With `ENOUGH` pictures from different sides the board may have been fixed anew since the calibration. With fewer it has to be
-    where it was; then one picture is enough.
+    With `ENOUGH` pictures from different sides the board may have been fixed anew since the calibration. With
+    fewer it has to be where it was; then one picture is enough.
 
     Args:
         calibration: where the cameras were.
@@ -67,17 +73,21 @@ def moved_since(calibration: Calibration, series: Series) -> tuple[dict[str, Mov
         Each camera's motion, and the problems that were found.
 
     Raises:
-        InvalidInput: if the series has a camera that was not calibrated, if no picture shows the board, or if too few
-            show another board than the one of the calibration.
+        InvalidInput: if the series has a camera that was not calibrated, if no picture shows the board, or if
+            too few show another board than the one of the calibration.
         NotCalibrated: if pictures and poses do not fit each other.
     """
     prepared = prepare(_with_intrinsics(calibration, series))
     series = prepared.series
-    start = Poses({n: calibration.cameras[n].T_mount_camera for n in series.cameras}, calibration.T_place_board)
+    start = Poses(
+        {n: calibration.cameras[n].T_mount_camera for n in series.cameras}, calibration.T_place_board
+    )
     free = _determined(prepared)
     if not free and (series.board_on != calibration.board_on or series.board != calibration.board):
         problem = "too few pictures, or all from one side, for another board than that of the calibration"
-        raise InvalidInput("shots", problem, f"the same board where it was, or {ENOUGH} pictures from different sides")
+        raise InvalidInput(
+            "shots", problem, f"the same board where it was, or {ENOUGH} pictures from different sides"
+        )
     refined = refine(series, prepared.pictures, start, fixed_board=not free)
     moved = {name: _moved(calibration, refined, name) for name in series.cameras}
     return moved, [problem for name, how in moved.items() for problem in _problems(name, how, free)]
@@ -135,13 +145,24 @@ def _moved(calibration: Calibration, refined: Refined, name: str) -> Moved:
 
 def _problems(name: str, moved: Moved, free: bool) -> list[Problem]:
     where = f"camera {name}"
-    off = f"{moved.millimetres:.1f} +- {moved.millimetres_off:.1f} mm and {moved.degrees:.2f} +- {moved.degrees_off:.2f} degrees"
     if moved.knocked:
         what = "it is" if free else "it, or the board, is"
-        problem = f"{what} {off} from where it was calibrated"
-        remedy = "fix it and calibrate again" if free else "if the board was not touched, fix it and calibrate again"
+        problem = f"{what} {moved}"
+        remedy = (
+            "fix it and calibrate again"
+            if free
+            else "if the board was not touched, fix it and calibrate again"
+        )
         return [Problem("knocked", "error", where, problem, remedy)]
     if moved.unsure:
         remedy = "take more pictures, with the hand turned about two axes, to tell whether it was knocked"
-        return [Problem("imprecise", "warning", where, f"it is {off} from where it was calibrated", remedy)]
+        return [
+            Problem(
+                "imprecise",
+                "warning",
+                where,
+                f"it is {moved}; a shift of {moved.unnoticed:.0f} mm would not be noticed",
+                remedy,
+            )
+        ]
     return []

@@ -24,11 +24,12 @@ Kind = Literal[
     "views_disagree",
     "robot_elsewhere",
 ]
-"""`few` and `alike`: too few pictures, or pictures that look alike, so that nothing can be told apart. `still`: the robot's poses do not
-turn while the pictures do. `inverted`, `robot_units`, `quaternion_order`, `angle_units`: the robot's poses mean
-something else. `out_of_step`: pictures belong to the poses before or after. `outlier`: one shot does not fit.
-`knocked`: a camera was moved. `unexplained`: pictures and poses do not fit, and no cause was found. `imprecise`: leaving out one shot moves
-the result. `views_disagree`, `robot_elsewhere`: depth images show a surface, or the arm, where it is not."""
+"""`few` and `alike`: too few pictures, or pictures that look alike, so that nothing can be told apart.
+`still`: the robot's poses do not turn while the pictures do. `inverted`, `robot_units`, `quaternion_order`,
+`angle_units`: the robot's poses mean something else. `out_of_step`: pictures belong to the poses before or
+after. `outlier`: one shot does not fit. `knocked`: a camera was moved. `unexplained`: pictures and poses do
+not fit, and no cause was found. `imprecise`: leaving out one shot moves the result. `views_disagree`,
+`robot_elsewhere`: depth images show a surface, or the arm, where it is not."""
 
 
 @dataclass(frozen=True)

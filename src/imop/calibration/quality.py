@@ -49,7 +49,8 @@ def shot_problems(series: Series, pictures: Pictures, refined: Refined) -> list[
         limit = max(OUTLIER, OUTLIER_TIMES * float(np.median(list(errors.values()))))
         for i, pixels in errors.items():
             if pixels > limit:
-                problem = f"its corners lie {pixels:.1f} px from where they should, those of all shots {refined.median(name):.1f}"
+                usual = refined.median(name)
+                problem = f"its corners lie {pixels:.1f} px from where they should, usual are {usual:.1f}"
                 where = f"camera {name}, {series.shots[i].name or f'shot {i}'}"
                 remedy = "leave it out, or take it again when the arm stands still"
                 problems.append(Problem("outlier", "warning", where, problem, remedy))
@@ -63,7 +64,7 @@ def shot_errors(refined: Refined, name: str) -> dict[int, float]:
 
 
 def _knocked_between(series: Series, pictures: Pictures, refined: Refined, name: str) -> Problem | None:
-    """The camera `name` as two cameras, one until a shot and one after it: whether that explains the errors."""
+    """One camera as two, one until a shot and one after it: whether that explains the errors."""
     numbers = sorted(pictures[name])
     best: tuple[float, int, float, float] | None = None
     for k in range(3, len(numbers) - 2):
@@ -89,8 +90,8 @@ def _knocked_between(series: Series, pictures: Pictures, refined: Refined, name:
     off, k, distance, angle = best
     names = [series.shots[i].name or f"shot {i}" for i in (numbers[k - 1], numbers[k])]
     problem = (
-        f"between {names[0]} and {names[1]} it was moved by {1000 * distance:.1f} mm and {np.degrees(angle):.2f} degrees "
-        f"(errors {refined.median(name):.1f} px, {off:.1f} with that)"
+        f"between {names[0]} and {names[1]} it was moved by {1000 * distance:.1f} mm and "
+        f"{np.degrees(angle):.2f} degrees (errors {refined.median(name):.1f} px, {off:.1f} with that)"
     )
     remedy = "fix the camera (and the board) so that nothing can move, and take the series again"
     return Problem("knocked", "error", f"camera {name}", problem, remedy)
@@ -135,8 +136,9 @@ def find_quality(
             _common(refined, name),
         )
         if quality.millimetres_off > PRECISE[0] or quality.degrees_off > PRECISE[1]:
-            problem = f"its pose is known to {quality.millimetres_off:.1f} mm and {quality.degrees_off:.2f} degrees only"
-            remedy = "take more pictures, nearer to the board, with the hand turned about two axes; check the robot's poses"
+            known = f"{quality.millimetres_off:.1f} mm and {quality.degrees_off:.2f} degrees"
+            problem = f"its pose is known to {known} only"
+            remedy = "take more pictures, nearer to the board, with the hand turned about two axes"
             problems.append(Problem("imprecise", "warning", f"camera {name}", problem, remedy))
     return found, problems
 

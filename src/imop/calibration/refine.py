@@ -41,8 +41,9 @@ class Refined:
         shot: camera -> (N,) number of the shot of each.
         deviation: of a coordinate of a corner, pixels, robust.
         independent: (n, n) as `covariance`, if the corners of a picture erred independently by a pixel.
-        covariance: (n, n) of the turns (radians) and shifts (metres) of the cameras in their own frames, six each in the order of
-            `poses.cameras`, then the board's, then of the scale's logarithm, as far as they were free.
+        covariance: (n, n) of the turns (radians) and shifts (metres) of the cameras in their own frames, six
+            each in the order of `poses.cameras`, then the board's, then of the scale's logarithm, as far as
+            they were free.
     """
 
     poses: Poses
@@ -140,10 +141,16 @@ def refine(
         whole[free] = x
         return whole
 
+    def residuals(x: FloatArray) -> FloatArray:
+        return errors(spread(x))[0]
+
+    def derivatives(x: FloatArray) -> FloatArray:
+        return np.asarray(errors(spread(x))[1][:, free])
+
     found = least_squares(
-        lambda x: errors(spread(x))[0],
+        residuals,
         np.zeros(len(free)),
-        jac=lambda x: errors(spread(x))[1][:, free],
+        jac=derivatives,
         loss="soft_l1",
         f_scale=OUTLIER,
         x_scale="jac",
@@ -200,12 +207,14 @@ def _cross(v: FloatArray) -> FloatArray:
 def _covariances(errors: FloatArray, J: FloatArray, shot: IntArray) -> tuple[FloatArray, FloatArray]:
     """Of the parameters, for independent errors of a pixel, and by the scatter from shot to shot.
 
-    The second is White's (1980) with shots as clusters, for errors of the robot act on all corners of one; `shot` is the number
-    of each row's.
+    The second is White's (1980) with shots as clusters, for errors of the robot act on all corners of one;
+    `shot` is the number of each row's.
     """
     weight = (1 + (errors / OUTLIER) ** 2) ** -0.5
-    bread = np.linalg.pinv((J * weight[:, None]).T @ J)
-    scores = np.stack([(J[shot == i] * (weight * errors)[shot == i, None]).sum(axis=0) for i in np.unique(shot)])
+    bread = np.asarray(np.linalg.pinv((J * weight[:, None]).T @ J), dtype=np.float64)
+    scores = np.stack(
+        [(J[shot == i] * (weight * errors)[shot == i, None]).sum(axis=0) for i in np.unique(shot)]
+    )
     # Each shot tells six numbers of the pose of the board.
     many = 6 * len(scores)
     return bread, np.asarray(bread @ scores.T @ scores @ bread * many / max(many - J.shape[1], 1))

@@ -30,14 +30,15 @@ class Quality:
         pixels: root of the mean square of the distances of corners from where they should be.
         worst_picture: name of the shot that fits worst.
         worst_pixels: median distance of its corners.
-        millimetres: median distance between where the robot, through the calibration, and where the picture alone puts the board's corners.
+        millimetres: median distance between where the robot, through the calibration, and where the picture
+            alone puts the board's corners.
         millimetres_off: standard error of the camera's position, by leaving out one picture after another.
         degrees_off: that of its rotation.
         spread_millimetres: how far the position moves at most if one picture is left out.
         spread_degrees: how far the rotation does.
         corner_pixels: standard deviation of a coordinate of a corner.
-        common: by how many times errors that all corners of a picture have in common, such as the robot's, make the
-            pose's variance larger than independent errors of the corners would.
+        common: by how many times errors that all corners of a picture have in common, such as the robot's,
+            make the pose's variance larger than independent errors of the corners would.
     """
 
     pictures: int
@@ -185,4 +186,6 @@ def _camera_of(
 
 def intrinsics_of(fields: Mapping[str, Any]) -> FloatArray:
     """(3, 3) of fields fx, fy, cx, cy, pixels."""
-    return np.array([[fields["fx"], 0, fields["cx"]], [0, fields["fy"], fields["cy"]], [0, 0, 1]], dtype=np.float64)
+    return np.array(
+        [[fields["fx"], 0, fields["cx"]], [0, fields["fy"], fields["cy"]], [0, 0, 1]], dtype=np.float64
+    )

@@ -108,8 +108,8 @@ class Series:
         shots: in the order in which they were taken.
 
     Raises:
-        InvalidInput: if a shot has corners of an unknown camera or with unknown numbers, or if a camera moves with
-            the board, so that nothing can be learned from it.
+        InvalidInput: if a shot has corners of an unknown camera or with unknown numbers, or if a camera moves
+            with the board, so that nothing can be learned from it.
     """
 
     board: Board
@@ -140,7 +140,8 @@ class Series:
     def motion(self, camera: str, T_base_gripper: FloatArray) -> FloatArray:
         """The known link M (..., 4, 4) of T_camera_board = inv(X) M Y.
 
-        X is the camera's pose where it is mounted (base or gripper), Y the board's pose where it is (base or gripper).
+        X is the camera's pose where it is mounted (base or gripper), Y the board's pose where it is (base or
+        gripper).
         """
         if self.board_on == "hand":
             return T_base_gripper

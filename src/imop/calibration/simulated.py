@@ -1,4 +1,4 @@
-"""A simulated cell to calibrate: the Panda, cameras whose true poses are known, and a board in their pictures.
+"""A simulated cell to calibrate: the Panda, cameras whose true poses are known, and a board before them.
 
 The arm is put at poses without physics, which a calibration does not need.
 """
@@ -144,11 +144,12 @@ def simulated_cell(
         noise: of depth; none if not given.
 
     Raises:
-        InvalidInput: if `kind` is unknown.
+        InvalidInput: if `kind` is unknown, or no camera has the name of one that is knocked.
         MissingExtra: without MuJoCo or OpenCV.
     """
     if kind not in ("beside", "hand"):
         raise InvalidInput("simulated", f"{kind!r}", "beside or hand")
+    board_on: BoardPlace = "hand" if kind == "beside" else "table"
     board, knocks = board or Board(), knocked or {}
     world = World(scene_spec())
     centre = se3.make(p=(-board.size[0] / 2, -board.size[1] / 2, 0.0))
@@ -156,11 +157,14 @@ def simulated_cell(
         poses = {name: se3.make(looking(BOARD_MIDDLE - p), p) for name, p in CAMERAS_BESIDE.items()}
         place = se3.make(se3.euler(x=np.pi), (0.0, 0.0, 0.03)) @ centre
         towards = np.mean(list(CAMERAS_BESIDE.values()), axis=0) - BOARD_MIDDLE
-        start, board_on, ahead = se3.make(looking(towards), BOARD_MIDDLE), "hand", 0.0
+        start, ahead = se3.make(looking(towards), BOARD_MIDDLE), 0.0
     else:
         poses = {"wrist": CAMERA_ON_HAND}
         place = se3.make(se3.euler(x=np.pi), (0.45, 0.0, 0.002)) @ centre
-        start, board_on, ahead = se3.make(se3.euler(x=np.pi), (0.42, 0.0, 0.38)), "table", 0.35
+        start, ahead = se3.make(se3.euler(x=np.pi), (0.47, 0.0, 0.38)), 0.35
+    for name in knocks:
+        if name not in poses:
+            raise InvalidInput("knocked", name, ", ".join(poses))
     poses = {name: T @ knocks.get(name, np.eye(4)) for name, T in poses.items()}
     on_hand = kind == "hand"
     cameras = {}
