@@ -8,7 +8,8 @@ from imop.calibration.solvers import fit_scaled
 from imop.geometry import se3
 from imop.types import FloatArray, IntArray
 
-_ROUNDS, _TRIED = 4, 10
+_ROUNDS, _TRIED, _LEAST = 5, 8, 3
+_AGREE = np.radians(1.0)
 
 
 def as_if_radians(T: FloatArray) -> FloatArray:
@@ -38,14 +39,18 @@ def _settled(
     A: FloatArray, T: FloatArray, options: FloatArray, chosen: IntArray, series: Series, camera: str
 ) -> tuple[float, FloatArray]:
     """Choose again what is nearest to what was seen, some times: median error in radians, and poses."""
-    numbers = np.arange(len(T))
+    numbers, turned = np.arange(len(T)), _angles(A[:, None], A[None])
     for _ in range(_ROUNDS):
         meant = se3.make(options[numbers, chosen][:, :3, :3], T[:, :3, 3])
-        fit = fit_scaled(A, series.motion(camera, meant))
-        M = fit.X @ A @ se3.invert(fit.Y)
-        right = M if series.board_on == "hand" else se3.invert(M)
+        # A wrong choice turns from most others otherwise than the board does.
+        agree = np.abs(_angles(meant[:, None], meant[None]) - turned) < _AGREE
+        good = np.argsort(-agree.sum(axis=1), kind="stable")[: max(_LEAST, len(T) // 2)]
+        M = series.motion(camera, meant)
+        fit = fit_scaled(A[good], M[good])
+        right = fit.X @ A @ se3.invert(fit.Y)
+        right = right if series.board_on == "hand" else se3.invert(right)
         chosen = np.argmin(_angles(right[:, None], options), axis=1).astype(np.int32)
-    return fit.angle, meant
+    return fit_scaled(A, M).angle, meant
 
 
 def _options(T: FloatArray) -> FloatArray:

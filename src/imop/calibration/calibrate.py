@@ -49,9 +49,12 @@ def calibrate(series: Series, T_world_base: FloatArray | None = None) -> Calibra
     _raise_errors(found_out)
     refined = refine(prepared.series, prepared.pictures, start_poses(prepared))
     found_out += size_problem(prepared.series, prepared.pictures, refined)
-    found_out += shot_problems(prepared.series, prepared.pictures, refined)
+    problems, pictures = shot_problems(prepared.series, prepared.pictures, refined)
+    found_out += problems
     _raise_errors(found_out)
-    quality, imprecise = find_quality(prepared.series, prepared.pictures, prepared.T_camera_board, refined)
+    if problems:
+        refined = refine(prepared.series, pictures, refined.poses)
+    quality, imprecise = find_quality(prepared.series, pictures, prepared.T_camera_board, refined)
     cameras = {
         name: CalibratedCamera(prepared.series.cameras[name], refined.poses.cameras[name], quality[name])
         for name in series.cameras

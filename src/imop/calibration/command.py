@@ -267,8 +267,8 @@ def _say_quality(calibration: "Calibration") -> None:
         lines = (
             f"{name}: at ({p[0]}, {p[1]}, {p[2]}) mm in the frame of the {frame}, known to "
             f"{q.millimetres_off:.2f} mm and {q.degrees_off:.3f} degrees",
-            f"  {q.pictures} pictures; corners are {q.pixels:.2f} px and {q.millimetres:.2f} mm off, worst in "
-            f"{q.worst_picture} ({q.worst_pixels:.2f} px)",
+            f"  {q.pictures} pictures; corners are {q.pixels:.2f} px and {q.millimetres:.2f} mm off, worst "
+            f"in {q.worst_picture} ({q.worst_pixels:.2f} px)",
             f"  without one picture it moves by at most {q.spread_millimetres:.2f} mm and "
             f"{q.spread_degrees:.3f} degrees",
         )

@@ -271,7 +271,7 @@ def _pose(fields: Mapping[str, Any] | Sequence[Sequence[float]]) -> FloatArray:
     if np.linalg.norm(turn) > _MOST_RADIANS:
         problem = f"a turn by {np.linalg.norm(turn):.0f}"
         raise InvalidInput("rotation_vector", problem, "radians, not degrees: at most a whole turn")
-    return se3.make(Rotation.from_rotvec(turn).as_matrix(), position)
+    return se3.make(Rotation.from_rotvec(turn.copy()).as_matrix(), position)
 
 
 def _shot_fields(shot: Recorded) -> dict[str, Any]:

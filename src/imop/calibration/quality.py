@@ -37,14 +37,17 @@ def size_problem(series: Series, pictures: Pictures, refined: Refined) -> list[P
     return [wrong_square(series, "board", free.scale)]
 
 
-def shot_problems(series: Series, pictures: Pictures, refined: Refined) -> list[Problem]:
-    """Shots that do not fit, and cameras that were moved between two shots."""
+def shot_problems(
+    series: Series, pictures: Pictures, refined: Refined
+) -> tuple[list[Problem], dict[str, dict[int, Corners]]]:
+    """Shots that do not fit, and cameras that were moved between two shots; and the pictures that fit."""
     problems: list[Problem] = []
+    good: dict[str, dict[int, Corners]] = {}
     for name in series.cameras:
         if refined.median(name) > SUSPICIOUS:
             knocked = _knocked_between(series, pictures, refined, name)
             if knocked is not None:
-                return [*problems, knocked]
+                return [*problems, knocked], good
         errors = shot_errors(refined, name)
         limit = max(OUTLIER, OUTLIER_TIMES * float(np.median(list(errors.values()))))
         for i, pixels in errors.items():
@@ -52,9 +55,10 @@ def shot_problems(series: Series, pictures: Pictures, refined: Refined) -> list[
                 usual = refined.median(name)
                 problem = f"its corners lie {pixels:.1f} px from where they should, usual are {usual:.1f}"
                 where = f"camera {name}, {series.shots[i].name or f'shot {i}'}"
-                remedy = "leave it out, or take it again when the arm stands still"
+                remedy = "it is left out; take pictures when the arm stands still"
                 problems.append(Problem("outlier", "warning", where, problem, remedy))
-    return problems
+        good[name] = {i: corners for i, corners in pictures[name].items() if errors[i] <= limit}
+    return problems, good
 
 
 def shot_errors(refined: Refined, name: str) -> dict[int, float]:

@@ -141,11 +141,22 @@ def refine(
         whole[free] = x
         return whole
 
+    # The solver asks for both at the same place, one after the other.
+    last: dict[bytes, tuple[FloatArray, FloatArray]] = {}
+
+    def both(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        key = x.tobytes()
+        if key not in last:
+            off, J = errors(spread(x))
+            last.clear()
+            last[key] = off, J[:, free]
+        return last[key]
+
     def residuals(x: FloatArray) -> FloatArray:
-        return errors(spread(x))[0]
+        return both(x)[0]
 
     def derivatives(x: FloatArray) -> FloatArray:
-        return np.asarray(errors(spread(x))[1][:, free])
+        return both(x)[1]
 
     found = least_squares(
         residuals,
@@ -158,9 +169,9 @@ def refine(
     )
     poses, scale = _moved_poses(start, spread(found.x))
     ends = np.cumsum([0, *(2 * len(camera.shot) for camera in seen)])
-    off, J = errors(spread(found.x))
+    off, J = both(found.x)
     shot = np.concatenate([np.repeat(camera.shot, 2) for camera in seen])
-    independent, covariance = _covariances(off, J[:, free], shot)
+    independent, covariance = _covariances(off, J, shot)
     return Refined(
         poses,
         scale,
