@@ -29,7 +29,7 @@ NOISES = {
 KNOCKS = {"none": (0.0, 0.0), "5 mm": (0.005, 0.0), "1 degree": (0.0, np.radians(1.0))}
 SHOTS = 15
 # Pictures of the check, and whether the board was fixed anew before it.
-CHECKS = ((1, False), (3, False), (8, True))
+CHECKS = ((1, False), (3, False), (8, True), (15, True))
 
 
 def calibrated(seed: int, mount: Mount, noise: Noise, shots: int = SHOTS) -> tuple[Truth, Calibration]:

@@ -19,7 +19,7 @@ SHIFT = se3.make(se3.euler(0.3, -0.2, 1.0), (0.4, -0.1, 0.2))
 
 
 @pytest.mark.parametrize("mount", MOUNTS)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_fifteen_pictures_tell_where_the_camera_is(seed, mount):
     truth, series = rig(seed, mount)
     found = calibrate(series)
@@ -33,7 +33,7 @@ def test_fifteen_pictures_tell_where_the_camera_is(seed, mount):
 def test_its_own_estimate_of_the_error_is_about_right():
     noise = Noise(0.3, 0.0002, np.radians(0.02))
     ratios = []
-    for seed in range(6):
+    for seed in range(3):
         truth, series = rig(seed, MOUNTS[seed % 2], noise=noise)
         camera = calibrate(series).cameras["camera"]
         off = 1000 * se3.translation_distance(camera.T_mount_camera, truth.T_mount_camera)

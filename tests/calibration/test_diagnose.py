@@ -86,8 +86,7 @@ def test_a_camera_that_is_mounted_elsewhere_is_named(mount):
     assert {"world": "beside the robot", "hand": "on the hand"}[mount] in text
 
 
-@pytest.mark.parametrize("mount", MOUNTS)
-@pytest.mark.parametrize("said", [0.020, 0.025, 0.0272, 0.0285])
+@pytest.mark.parametrize(("said", "mount"), [(0.020, "world"), (0.0272, "hand"), (0.0285, "world")])
 def test_squares_of_another_size_are_named_with_their_size(said, mount):
     _, series = rig(2, mount)
     kinds, text = told(replace(series, board=Board(square=said, marker=0.75 * said)))
@@ -133,7 +132,7 @@ def test_too_few_pictures_are_an_error_and_few_a_warning(mount):
 
 
 @pytest.mark.parametrize("mount", MOUNTS)
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_nothing_is_said_where_nothing_is_wrong(seed, mount):
     _, series = rig(seed, mount, noise=Noise(0.3, 0.0001, np.radians(0.01)))
     assert not calibrate(series).problems

@@ -18,8 +18,8 @@ RobotDistance = Callable[[FloatArray, FloatArray, float], FloatArray]
 
 VIEWS_FAR = 1.0
 """Millimetres by which surfaces of two views may be farther apart than they need to be."""
-ROBOT_FAR = 4.0, 0.7
-"""Millimetres and degrees by which the robot may seem to be elsewhere; models of arms are not exact."""
+ROBOT_FAR = 3.5
+"""Millimetres by which the robot may seem to be elsewhere; models of arms are not exact."""
 REACHES = (0.06, 0.045, 0.03, 0.025, 0.02, 0.015, 0.015, 0.015)
 """Metres around the robot in which points are taken for its own, from the first round to the last."""
 POINTS, FEW = 1000, 200
@@ -36,12 +36,14 @@ class Off:
     Attributes:
         millimetres: between the positions.
         degrees: between the rotations.
+        seen: how far what it sees is moved by that, mean, millimetres.
         before: mean distance of points from the surfaces that they should be on, millimetres, as it was said.
         after: the same with the camera where it seems to be.
     """
 
     millimetres: float
     degrees: float
+    seen: float
     before: float
     after: float
 
@@ -78,7 +80,10 @@ def check_views(observations: Sequence[Observation]) -> tuple[dict[str, Off], li
     errors = find_errors(observations)
     before = 1000 * float(np.nanmean(apart))
     after = 1000 * float(np.nanmean([disagreement(corrected(o, errors)) for o in observations]))
-    found = {name: _off(T, before, after) for name, T in errors.items()}
+    found = {}
+    for name, T in errors.items():
+        view = next(o.views[name] for o in observations if name in o.views)
+        found[name] = _off(T, _points(view, POINTS), before, after)
     if before - after < VIEWS_FAR:
         return found, []
     where = "cameras " + " and ".join(names)
@@ -104,8 +109,10 @@ def check_robot(
         if off is None:
             continue
         found[name] = off
-        if off.millimetres > ROBOT_FAR[0] or off.degrees > ROBOT_FAR[1]:
-            problem = f"it sees the robot elsewhere than its joints say; the camera would fit if it is {off}"
+        if off.seen > ROBOT_FAR:
+            problem = (
+                f"it sees the robot {off.seen:.1f} mm beside where its joints say; the camera may be {off}"
+            )
             remedy = (
                 "look whether the camera was knocked, whether joint positions are of this moment, and "
                 "whether the robot's model is right"
@@ -114,9 +121,10 @@ def check_robot(
     return found, problems
 
 
-def _off(T: FloatArray, before: float, after: float) -> Off:
+def _off(T: FloatArray, points: FloatArray, before: float, after: float) -> Off:
     angle = float(np.degrees(se3.rotation_distance(T, np.eye(4))))
-    return Off(1000 * float(np.linalg.norm(T[:3, 3])), angle, before, after)
+    seen = float(np.linalg.norm(se3.apply(T, points) - points, axis=1).mean())
+    return Off(1000 * float(np.linalg.norm(T[:3, 3])), angle, 1000 * seen, before, after)
 
 
 def _robot_off(seen: Sequence[tuple[CameraView, Observation]], distance: RobotDistance) -> Off | None:
@@ -136,7 +144,7 @@ def _robot_off(seen: Sequence[tuple[CameraView, Observation]], distance: RobotDi
         before = after if i == 0 else before
         step = -np.linalg.solve(H, g)
         T = T @ moved(np.asarray(step))
-    return _off(T, before, after)
+    return _off(T, np.concatenate(clouds), before, after)
 
 
 def _twist(T: FloatArray) -> FloatArray:
@@ -145,16 +153,21 @@ def _twist(T: FloatArray) -> FloatArray:
 
 def _near(view: CameraView, observation: Observation, distance: RobotDistance) -> FloatArray:
     """(N, 3) points in the camera's frame that may be on the robot."""
-    row, column = np.nonzero(view.measured)
-    some = slice(None, None, max(1, len(row) // (15 * POINTS)))
-    row, column = row[some], column[some]
-    z, K = view.depth[row, column].astype(np.float64), view.intrinsics
-    p = np.stack([(column - K[0, 2]) / K[0, 0] * z, (row - K[1, 2]) / K[1, 1] * z, z], axis=1)
+    p = _points(view, 15 * POINTS)
     q = observation.joint_positions
     assert q is not None
     near = distance(se3.apply(view.T_world_camera, p), q, observation.gripper_opening) < REACHES[0]
     p = p[near]
     return p[:: max(1, len(p) // POINTS)]
+
+
+def _points(view: CameraView, most: int) -> FloatArray:
+    """(N, 3) some of the points that a view measured, in the camera's frame."""
+    row, column = np.nonzero(view.measured)
+    some = slice(None, None, max(1, len(row) // most))
+    row, column = row[some], column[some]
+    z, K = view.depth[row, column].astype(np.float64), view.intrinsics
+    return np.stack([(column - K[0, 2]) / K[0, 0] * z, (row - K[1, 2]) / K[1, 1] * z, z], axis=1)
 
 
 def _rows(

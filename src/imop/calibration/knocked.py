@@ -16,8 +16,8 @@ from imop.geometry import se3
 
 FAR = 2.5, 0.5
 """Millimetres and degrees from which a camera was moved; half of the knocks that have to be noticed."""
-CHANCE = 40.0
-"""Squared Mahalanobis distance (six degrees of freedom) from which a motion is no chance."""
+CHANCE = 30.0
+"""Squared Mahalanobis distance (six degrees of freedom) from which a motion is no chance; 1 in 25,000."""
 ENOUGH = 6
 """Pictures with which the board may have been fixed anew meanwhile."""
 
