@@ -22,6 +22,7 @@ class Arm:
     T: np.ndarray = field(default_factory=lambda: np.eye(4))
     creep: float = 0.0
     recovered: int = 0
+    stopped: bool = False
 
     def state(self):
         self.T = self.T @ se3.make(p=(self.creep, 0.0, 0.0))
@@ -37,7 +38,7 @@ class Arm:
         return DONE
 
     def stop(self):
-        pass
+        self.stopped = True
 
     def recover(self):
         self.recovered += 1
@@ -95,6 +96,18 @@ def test_nothing_is_stored_of_an_arm_that_moves_or_without_the_board(tmp_path):
     assert shoot(recording, rig) == (recording, "moved")
     blind = replace(rig, robot=Arm(), cameras={"front": Eye(sees=False)})
     assert shoot(recording, blind) == (recording, "no board")
+
+
+def test_whatever_interrupts_it_stops_the_arm(tmp_path):
+    rig = Rig(Arm(), {"front": Eye()})
+    recording = start_recording(tmp_path, rig, BOARD, "hand")
+
+    def interrupt(*what):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        collect(recording, rig, poses(0.1, 0.2), 15, interrupt)
+    assert rig.robot.stopped
 
 
 def test_cameras_that_move_with_the_board_are_left_out(tmp_path):

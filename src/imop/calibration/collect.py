@@ -89,7 +89,8 @@ def collect(
 ) -> Recording:
     """Go through poses (4, 4) T_base_gripper, and store what is seen there, until there are `count` shots.
 
-    A pose that cannot be reached is left out, and the arm recovers from its error.
+    A pose that cannot be reached is left out, and the arm recovers from its error. Whatever interrupts it
+    stops the arm.
 
     Args:
         recording: what is there already.
@@ -98,16 +99,20 @@ def collect(
         count: how many shots there shall be.
         say: told the number of each pose, what became of it, and why.
     """
-    for number, T in enumerate(poses):
-        if len(recording.shots) >= count:
-            break
-        result = rig.robot.move_to(T)
-        if not result.done:
-            say(number, "not reached", f"{result.reason} {result.detail}".strip())
-            rig.robot.recover()
-            continue
-        recording, what = shoot(recording, rig)
-        say(number, what, "")
+    try:
+        for number, T in enumerate(poses):
+            if len(recording.shots) >= count:
+                break
+            result = rig.robot.move_to(T)
+            if not result.done:
+                say(number, "not reached", f"{result.reason} {result.detail}".strip())
+                rig.robot.recover()
+                continue
+            recording, what = shoot(recording, rig)
+            say(number, what, "")
+    except BaseException:  # somebody pressed Ctrl-C, or a camera failed: the arm must not go on
+        rig.robot.stop()
+        raise
     return recording
 
 
