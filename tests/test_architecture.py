@@ -21,6 +21,7 @@ ALLOWED = {
     "robots": BASE | {"geometry"},
     "cameras": BASE | {"geometry"},
     "setup": BASE | {"geometry", "demos", "robots", "cameras", "sim", "terminal"},
+    "calibration": BASE | {"geometry", "demos", "robots", "cameras", "sim", "setup", "plugins", "terminal"},
     "sim": BASE | {"geometry", "robots"},
     "tasks": BASE | {"geometry", "robots", "sim", "plugins"},
     "training": BASE | {"geometry", "demos", "networks", "policy", "robots", "sim"},

@@ -14,6 +14,7 @@ from rich.text import Text
 from tyro.conf import Positional
 
 from imop import cli_data
+from imop.calibration.command import calibrate
 from imop.errors import ImopError, InvalidInput, MissingExtra
 from imop.files import writable_folder
 from imop.reproduce.command import reproduce
@@ -228,6 +229,7 @@ def evaluate(
 
 
 app.command(reproduce)
+app.command(calibrate)
 app.command(name="import")(cli_data.import_)
 app.command(cli_data.export)
 app.command(cli_data.check)
