@@ -5,6 +5,7 @@ import pytest
 from PIL import Image
 
 from imop.calibration.board import DPI, INCH, MARGIN, Board, save_board
+from imop.calibration.command import BoardSizes
 from imop.calibration.detect import detect_corners
 from imop.errors import InvalidInput
 
@@ -57,3 +58,7 @@ def test_the_default_board_fits_onto_a4(tmp_path):
 def test_only_pictures_and_pages_are_written(tmp_path):
     with pytest.raises(InvalidInput, match="png"):
         save_board(Board(), tmp_path / "board.svg")
+
+
+def test_the_command_line_draws_the_same_board_as_the_library():
+    assert BoardSizes().board() == Board()

@@ -5,16 +5,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import numpy as np
 import tyro
 from tyro.conf import Positional
 
-from imop.calibration.board import Board
 from imop.errors import InvalidInput
 from imop.files import writable_folder
 from imop.terminal import console, status, track
 
 if TYPE_CHECKING:
+    from imop.calibration.board import Board
     from imop.calibration.collect import Rig
     from imop.calibration.folder import Recording
     from imop.calibration.problems import Problem
@@ -27,21 +26,23 @@ _LOOKED_AT = 3
 
 @dataclass(frozen=True)
 class BoardSizes:
-    """How the board is made."""
+    """How the board is made; by default as `Board` is, which takes numpy to import."""
 
-    columns: int = Board.columns
+    columns: int = 8
     """squares in a row"""
-    rows: int = Board.rows
+    rows: int = 6
     """rows of squares"""
-    square: float = Board.square
+    square: float = 0.028
     """edge of a square, metres, as measured on the print"""
-    marker: float = Board.marker
+    marker: float = 0.021
     """edge of a marker, metres"""
-    dictionary: str = Board.dictionary
+    dictionary: str = "DICT_4X4_50"
     """OpenCV's name of the set of markers"""
 
-    def board(self) -> Board:
+    def board(self) -> "Board":
         """The board of these sizes."""
+        from imop.calibration.board import Board
+
         return Board(self.columns, self.rows, self.square, self.marker, self.dictionary)
 
 
@@ -88,6 +89,8 @@ class Collect:
 
     def __call__(self) -> int:
         """Run it."""
+        import numpy as np
+
         from imop.calibration.collect import collect, proposed_poses, start_recording
 
         if bool(self.rig) == bool(self.simulated):
