@@ -12,7 +12,8 @@ from imop.geometry.focus import Focus
 from imop.geometry.neighbours import nearest
 from imop.geometry.view_alignment import corrected, find_errors
 from imop.networks.model import Model, ModelConfig, save_model
-from imop.policy.one_shot import CLEARANCE, OneShotPolicy, above_ground
+from imop.policy.decision import CLEARANCE, above_ground
+from imop.policy.one_shot import OneShotPolicy
 from imop.policy.recovery import ARRIVED
 from imop.policy.registration import RegistrationMatcher
 from imop.policy.router import AdvancingRouter, LearnedRouter

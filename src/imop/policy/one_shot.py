@@ -1,18 +1,18 @@
 """The policy: watch a demonstration once, then act in scenes that were never seen."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from imop.errors import CorruptData, InvalidInput, NoConfidentMatch
-from imop.geometry import se3
 from imop.geometry.focus import Focus, in_focus
 from imop.geometry.memory import with_hidden
 from imop.geometry.perception import Perception
 from imop.geometry.view_alignment import corrected, find_errors
 from imop.networks.model import BUNDLED, load_model
+from imop.policy.decision import Decision, transferred
 from imop.policy.interfaces import (
     BEGINNING,
     Candidate,
@@ -26,28 +26,7 @@ from imop.policy.interfaces import (
 from imop.policy.learned import LearnedMatcher
 from imop.policy.recovery import Attempts, same_place
 from imop.policy.router import AdvancingRouter, LearnedRouter, Option, Router, holds
-from imop.types import Action, Demonstration, FloatArray, Match, Observation
-
-# The tip is kept this far above the ground, metres, if it was shown above it. What would be deeper in the
-# ground than the error of a pose is another motion, and left as it is. Chosen on ring_on_peg, seeds 10 to 19.
-CLEARANCE, MISJUDGED = 0.003, 0.02
-
-
-@dataclass(frozen=True, eq=False)
-class Decision:
-    """What a policy would do, and what else it might; nothing is done yet.
-
-    Attributes:
-        option: the demonstrated step that is transferred.
-        query: the observed scene.
-        candidates: where the step's region may be in it, likeliest first.
-        action: of one of them, at first of the likeliest.
-    """
-
-    option: Option
-    query: Scene
-    candidates: tuple[Candidate, ...]
-    action: Action
+from imop.types import Action, Demonstration, FloatArray, Observation
 
 
 class OneShotPolicy:
@@ -208,8 +187,8 @@ class OneShotPolicy:
         """
         if not 0 <= number < len(decision.candidates):
             raise InvalidInput("number", f"{number}", f"0 .. {len(decision.candidates) - 1}")
-        candidate, option = decision.candidates[number], decision.option
-        return replace(decision, action=self._action(decision.query, option, candidate))
+        option, candidate = decision.option, decision.candidates[number]
+        return replace(decision, action=self._transferred(decision.query, option, candidate))
 
     def take(self, decision: Decision) -> None:
         """Its action is being performed: the episode goes on from there."""
@@ -336,45 +315,12 @@ class OneShotPolicy:
         if not candidates or candidates[0].probability < self._min_confidence:
             probability = candidates[0].probability if candidates else 0.0
             raise NoConfidentMatch(probability, self._min_confidence)
-        return Decision(option, query, candidates, self._action(query, option, candidates[0]))
+        return Decision(option, query, candidates, self._transferred(query, option, candidates[0]))
 
-    def _action(self, query: Scene, option: Option, candidate: Candidate) -> Action:
-        """The demonstrated action, carried over by a candidate."""
+    def _transferred(self, query: Scene, option: Option, candidate: Candidate) -> Action:
         shown = self._demonstrations[option.demonstration][option.step]
-        demonstrated = shown.action
         region = self._prepared[option.demonstration][option.step].region
-        T = se3.orthonormal(candidate.T_query_support)
-        match = Match(
-            option.step,
-            candidate.p_support,
-            candidate.p_query,
-            region,
-            T,
-            candidate.generator,
-            candidate.probability,
-        )
-        return Action(
-            above_ground(se3.orthonormal(T @ demonstrated.T_world_gripper), query, shown),
-            demonstrated.gripper_open,
-            demonstrated.allow_collisions,
-            candidate.probability,
-            match,
-            candidate.reachable,
-        )
-
-
-def above_ground(T_world_gripper: FloatArray, query: Scene, shown: Transition) -> FloatArray:
-    """The pose (4, 4), lifted by what it is too near to the ground, if it was shown above the ground."""
-    here, there = query.ground.plane, shown.before.ground.plane
-    if here is None or there is None:
-        return T_world_gripper
-    height = float(here.height(T_world_gripper[None, :3, 3])[0])
-    height_shown = float(there.height(shown.action.T_world_gripper[None, :3, 3])[0])
-    missing = min(height_shown, CLEARANCE) - height
-    lifted = T_world_gripper.copy()
-    if height_shown > 0 and 0 < missing < MISJUDGED:
-        lifted[:3, 3] += missing * here.normal
-    return lifted
+        return transferred(shown, option.step, region, query, candidate)
 
 
 def _focused(scenes: Sequence[Scene], demonstration: Demonstration, focus: Focus) -> list[Scene]:

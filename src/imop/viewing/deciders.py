@@ -7,8 +7,9 @@ from imop.errors import InvalidInput, NoConfidentMatch
 from imop.evaluation.methods import Policy
 from imop.geometry.focus import Focus
 from imop.geometry.perception import Perception
+from imop.policy.decision import Decision
 from imop.policy.interfaces import Scene
-from imop.policy.one_shot import Decision, OneShotPolicy
+from imop.policy.one_shot import OneShotPolicy
 from imop.types import Action, Demonstration, Observation
 from imop.viewing.look import Look, Shown
 
