@@ -38,6 +38,7 @@ ALLOWED = {
 }
 ALLOWED["terminal"] = set()
 ALLOWED["reproduce"] = ALLOWED["evaluation"] | {"evaluation", "terminal"}
+ALLOWED["serving"] = BASE | {"geometry", "demos", "policy", "evaluation", "terminal"}
 
 
 def imports(path):
