@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 from imop.errors import ImopError, InvalidInput
 from imop.extras import extra
 from imop.serving.limits import Limits, TimeLimitExceeded, WorkerEnded
+from imop.serving.racing import race
 from imop.serving.session import Outcome, Reply
 from imop.serving.workers import Host, Worker
 
@@ -81,19 +82,13 @@ class Conversation:
         Raises:
             TimeoutError: if it takes too long.
         """
-        received = asyncio.ensure_future(self._client.recv())
-        stopped = asyncio.ensure_future(self._shared.stopping.wait())
         seconds = self._shared.limits.idle_seconds
-        try:
-            await asyncio.wait({received, stopped}, timeout=seconds, return_when=asyncio.FIRST_COMPLETED)
-            if received.done():
-                return received.result()
-            if stopped.done():
-                return None
-            raise TimeoutError
-        finally:
-            received.cancel()
-            stopped.cancel()
+        received, stopped = await race(self._client.recv(), self._shared.stopping.wait(), seconds)
+        if not received.cancelled():
+            return received.result()
+        if not stopped.cancelled():
+            return None
+        raise TimeoutError
 
     async def _send(self, message: bytes | str) -> None:
         async with asyncio.timeout(self._shared.limits.idle_seconds):
@@ -101,14 +96,8 @@ class Conversation:
 
     async def _while_connected(self, asked: Coroutine[Any, Any, T]) -> T | None:
         """What is asked for, or None if the client leaves first: nobody shall work for who is gone."""
-        answer = asyncio.ensure_future(asked)
-        left = asyncio.ensure_future(self._client.wait_closed())
-        try:
-            await asyncio.wait({answer, left}, return_when=asyncio.FIRST_COMPLETED)
-            return answer.result() if answer.done() else None
-        finally:
-            answer.cancel()
-            left.cancel()
+        answer, _ = await race(asked, self._client.wait_closed())
+        return None if answer.cancelled() else answer.result()
 
     async def _reply(self, message: str | bytes, prev_total_ms: float) -> Reply:
         if isinstance(message, str):

@@ -5,7 +5,7 @@ errors name the entry, such as views.front.depth.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -27,7 +27,8 @@ _VIEW = ("rgb", "depth", "intrinsics", "T_world_camera")
 _OBSERVATION = ("views", "T_world_gripper", "gripper_opening")
 _OBSERVATION_MAY = ("time_step", "joint_positions")
 _ACTION = ("T_world_gripper", "gripper_open")
-_ACTION_MAY = ("allow_collisions", "confidence", "reachable", "match", "actions", "server_timing")
+_ACTION_MAY = ("allow_collisions",)
+_REPLY_MAY = ("confidence", "reachable", "match", "actions", "server_timing")
 _MATCH = ("step", "p_support", "p_query", "region", "T_query_support", "generator", "probability")
 
 
@@ -98,7 +99,7 @@ def to_observation(value: Any, limits: Limits) -> Observation:
     views = _names("views", fields["views"])
     _check_points(views, limits)
     time_step = _scalar("time_step", fields.get("time_step", 0))
-    if time_step != int(time_step) or not 0 <= time_step < 2**31:
+    if not 0 <= time_step < 2**31 or time_step != int(time_step):
         raise InvalidInput("time_step", f"{time_step}", "an integer from 0 on")
     return Observation(
         {name: _within(f"views.{name}", _to_view, view) for name, view in views.items()},
@@ -157,17 +158,23 @@ def action_fields(action: Action) -> Fields:
 
 
 def to_action(value: Any) -> Action:
-    """The action of its fields; raises as `to_request` does."""
+    """The action of a reply; raises as `to_request` does."""
+    fields = _fields("reply", value, _ACTION, (*_ACTION_MAY, *_REPLY_MAY))
+    match, reachable = fields.get("match"), fields.get("reachable")
+    return replace(
+        _to_shown_action({name: fields[name] for name in (*_ACTION, *_ACTION_MAY) if name in fields}),
+        confidence=_scalar("confidence", fields.get("confidence", 1.0)),
+        match=None if match is None else _within("match", _to_match, match),
+        reachable=None if reachable is None else _flag("reachable", reachable),
+    )
+
+
+def _to_shown_action(value: Any) -> Action:
     fields = _fields("action", value, _ACTION, _ACTION_MAY)
-    match = fields.get("match")
-    reachable = fields.get("reachable")
     return Action(
         fields["T_world_gripper"],
         _flag("gripper_open", fields["gripper_open"]),
         _flag("allow_collisions", fields.get("allow_collisions", False)),
-        _scalar("confidence", fields.get("confidence", 1.0)),
-        None if match is None else _within("match", _to_match, match),
-        None if reachable is None else _flag("reachable", reachable),
     )
 
 
@@ -175,7 +182,7 @@ def _to_keyframe(value: Any, limits: Limits) -> Keyframe:
     fields = _fields("keyframe", value, ("observation", "action"))
     return Keyframe(
         _within("observation", lambda seen: to_observation(seen, limits), fields["observation"]),
-        _within("action", to_action, fields["action"]),
+        _within("action", _to_shown_action, fields["action"]),
     )
 
 

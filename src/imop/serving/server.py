@@ -24,6 +24,7 @@ from imop.extras import extra
 from imop.serving import schema, wire
 from imop.serving.conversation import Conversation, Shared
 from imop.serving.limits import Limits, WorkerEnded
+from imop.serving.racing import race
 from imop.serving.session import MakePolicy
 from imop.serving.workers import Host
 from imop.types import Demonstration
@@ -82,10 +83,13 @@ class Server:
         self._address, self._key, self._limits = (host, port), key, limits or Limits()
         self._turn, self._stopping = asyncio.Semaphore(workers), asyncio.Event()
         self._metadata = wire.pack({**(metadata or {}), **self._description()})
-        self._sessions = 0
+        self._conversations: set[asyncio.Task[None]] = set()
 
     def stop(self) -> None:
-        """Let what is worked on be finished and sent, then end; call it in the thread of the event loop."""
+        """Let what is worked on be finished and sent, then end; to be called in the thread of `run`.
+
+        To end at once, cancel `run`.
+        """
         self._stopping.set()
 
     async def run(self, started: Callable[[int], None] = lambda port: None) -> None:
@@ -121,20 +125,19 @@ class Server:
             ping_timeout=PATIENCE,
             logger=_logger,
         )
-        ended = asyncio.ensure_future(shared.host.ended())
-        stopped = asyncio.ensure_future(self._stopping.wait())
-        try:
-            async with server:
-                started(next(iter(server.sockets)).getsockname()[1])
-                await asyncio.wait({ended, stopped}, return_when=asyncio.FIRST_COMPLETED)
-                self._stopping.set()
+        async with server:
+            started(next(iter(server.sockets)).getsockname()[1])
+            ended, _ = await race(shared.host.ended(), self._stopping.wait())
+            self._stopping.set()
+            try:
                 server.close(close_connections=False)
                 await server.wait_closed()
-            if ended.done():
-                raise WorkerEnded
-        finally:
-            ended.cancel()
-            stopped.cancel()
+            except asyncio.CancelledError:
+                for conversation in self._conversations:
+                    conversation.cancel()
+                raise
+        if not ended.cancelled():
+            raise WorkerEnded
 
     def _description(self) -> dict[str, Any]:
         cameras = {name for one in self._demonstrations for name in one.keyframes[0].observation.views}
@@ -154,22 +157,23 @@ class Server:
         if self._key and not _has_key(request, self._key):
             problem = "wrong or missing key; accepted: the header Authorization: Api-Key KEY\n"
             return client.respond(HTTPStatus.UNAUTHORIZED, problem)
-        if self._sessions >= self._limits.sessions:
-            problem = f"there are {self._sessions} sessions already; remedy: try again later\n"
+        if (sessions := len(self._conversations)) >= self._limits.sessions:
+            problem = f"there are {sessions} sessions already; remedy: try again later\n"
             return client.respond(HTTPStatus.SERVICE_UNAVAILABLE, problem)
         return None
 
     async def _handle(self, client: ServerConnection, shared: Shared) -> None:
-        if self._sessions >= self._limits.sessions:
+        task = asyncio.current_task()
+        if len(self._conversations) >= self._limits.sessions or task is None:
             # Several were let in before the first of them was counted.
             await client.close(CloseCode.TRY_AGAIN_LATER, "too many sessions")
             return
-        self._sessions += 1
+        self._conversations.add(task)
         try:
             with suppress(ConnectionClosed):
                 await Conversation(client, shared).hold()
         finally:
-            self._sessions -= 1
+            self._conversations.discard(task)
 
 
 def is_loopback(host: str) -> bool:
