@@ -29,7 +29,7 @@ class Remembering:
         if todo == SLEEP:
             time.sleep(600)
         elif todo == NAP:
-            time.sleep(0.3)
+            time.sleep(0.1)
         elif todo == CRASH:
             os._exit(11)
         elif todo == UNSURE:

@@ -164,7 +164,7 @@ WRONG = st.one_of(
 
 
 @given(st.sampled_from(list(places(WHOLE))[1:]), WRONG)
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_any_field_with_any_value_is_read_or_refused(path, wrong):
     fields = copy.deepcopy(WHOLE)
     inner = fields

@@ -16,12 +16,20 @@ from imop.serving.server import is_loopback
 from tests.serving.policies import CRASH, GREEDY, NAP, SLEEP, UNSURE, Refusing, Remembering, demonstrate
 from tests.serving.running import Running, ask, ask_once, message, place, serving
 
-LIMITS = Limits(request_seconds=1.0, message_bytes=200_000, sessions=12, session_bytes=2**30)
+LIMITS = Limits(message_bytes=200_000, sessions=12, session_bytes=2**30)
 
 
 @pytest.fixture(scope="module")
 def server():
     with serving(demonstrations=[demonstrate()], limits=LIMITS, workers=2) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def hasty():
+    """One that works on one request at a time, and not for long."""
+    limits = Limits(request_seconds=1.5)
+    with serving(demonstrations=[demonstrate()], limits=limits, workers=1) as running:
         yield running
 
 
@@ -130,7 +138,6 @@ def test_eight_clients_of_whom_five_misbehave_lose_nothing_of_the_others_episode
         (message(prompt="please"), "InvalidInput: prompt: is no field"),
         (message(gripper_opening=7), "InvalidInput: gripper_opening: 7"),
         (message(time_step=GREEDY), "MemoryError"),
-        (message(time_step=SLEEP), "TimeLimitExceeded: request: took more than 1 s"),
         (message(time_step=CRASH), "WorkerEnded: request: the process that worked on it ended"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
@@ -157,12 +164,11 @@ def test_a_message_beyond_the_limit_is_refused_by_its_size(server):
         assert code_of(client) == 1009
 
 
-def test_endless_requests_give_their_workers_back(server):
-    # As many as there are workers, and others behind them.
-    with ThreadPoolExecutor(5) as clients:
-        endless = [clients.submit(ask_once, server, time_step=SLEEP) for _ in range(3)]
-        behind = [clients.submit(episode, server, [0.5, 0.25]) for _ in range(2)]
-        assert all("TimeLimitExceeded" in one.result() for one in endless)
+def test_endless_requests_give_their_workers_back(hasty):
+    with ThreadPoolExecutor(4) as clients:
+        endless = [clients.submit(ask_once, hasty, time_step=SLEEP) for _ in range(2)]
+        behind = [clients.submit(episode, hasty, [0.5, 0.25]) for _ in range(2)]
+        assert all("TimeLimitExceeded: request: took more than 1.5 s" in one.result() for one in endless)
         assert all(one.result() == expected([0.5, 0.25]) for one in behind)
 
 
@@ -229,23 +235,22 @@ def test_shutting_down_finishes_the_step_and_sends_it():
             status_of(server)
 
 
-def test_sessions_take_turns():
-    # One worker: who asks three times while two others ask waits for them in between.
-    with serving(demonstrations=[demonstrate()], workers=1) as server, ThreadPoolExecutor(3) as clients:
-        done = []
+def test_sessions_take_turns(hasty):
+    done, together = [], threading.Barrier(3)
 
-        def go(name):
-            with server.join() as client:
-                for _ in range(3):
-                    ask(client, 0.5, NAP)
-                    done.append(name)
+    def go(name):
+        with hasty.join() as client:
+            together.wait()
+            for _ in range(4):
+                ask(client, 0.5, NAP)
+                done.append(name)
 
+    with ThreadPoolExecutor(3) as clients:
         for one in [clients.submit(go, name) for name in "abc"]:
             one.result()
-    # Nobody is served a second time before everybody has been served once, give or take the first turn.
-    assert all(
-        abs(done[:k].count(a) - done[:k].count(b)) <= 2 for k in range(10) for a in "abc" for b in "abc"
-    )
+    # Nobody gets far ahead; whose first request is late may be one turn behind.
+    ahead = [done[:k].count(a) - done[:k].count(b) for k in range(13) for a in "abc" for b in "abc"]
+    assert max(ahead) <= 2
 
 
 def test_what_the_policy_says_against_a_preloaded_demonstration_is_raised():

@@ -31,7 +31,6 @@ def same(a, b):
 
 
 @given(VALUES)
-@settings(max_examples=40, deadline=None)
 def test_what_is_packed_comes_back(value):
     assert same(value, unpack(pack(value)))
 
@@ -118,7 +117,7 @@ def test_garbage_is_named_as_such(message):
 
 
 @given(st.data())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_damaged_messages_are_read_or_refused(data):
     message = bytearray(
         pack({"views": {"front": np.arange(6.0)}, "n": [1, 2.5, None, "text"], "f": np.float32(1)})

@@ -221,10 +221,10 @@ def _fields(name: str, value: Any, needed: tuple[str, ...], others: tuple[str, .
     known = ", ".join((*needed, *others))
     for field in needed:
         if field not in fields:
-            raise InvalidInput(field, "is missing", f"a {name} of {known}")
+            raise InvalidInput(field, "is missing", f"the {name} has {known}")
     for field in fields:
         if field not in needed and field not in others:
-            raise InvalidInput(field, f"is no field of a {name}", known)
+            raise InvalidInput(field, f"is no field of the {name}", known)
     return fields
 
 
