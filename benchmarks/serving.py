@@ -5,9 +5,9 @@
     python benchmarks/serving.py --requests 1000 --json FILE
 
 The same policy is asked in this process and through the server for the same recorded states, one after the
-other, so that the ratio depends little on what else the machine does. `--larger 5` makes images of 640 x 640 of
-the simulation's 128 x 128, as a real camera sends them. With `--requests` the server alone is asked so often, in
-episodes one after the other, and the memory of all its processes is read in between.
+other, so that the ratio depends little on what else the machine does. `--larger 5` makes images of 640 x 640
+of the simulation's 128 x 128, as a real camera sends them. With `--requests` the server alone is asked so
+often, in episodes one after the other, and the memory of all its processes is read in between.
 """
 
 import json
@@ -68,7 +68,7 @@ def enlarged(view: CameraView, times: int) -> CameraView:
 
 
 def recorded(options: Options, seed: int) -> Demonstration:
-    shown = record_demonstration(make_task(options.task), 0, 0, seed).stripped()
+    shown = record_demonstration(make_task(options.task), seed, instance_seed=0).stripped()
 
     def larger(observation: Observation) -> Observation:
         views = {name: enlarged(view, options.larger) for name, view in observation.views.items()}
