@@ -24,7 +24,8 @@ class Remembering:
     def reset(self):
         self.seen = []
 
-    def act(self, observation):
+    def act(self, observation, focus=None):
+        self.meant = focus
         todo = observation.time_step
         if todo == SLEEP:
             time.sleep(600)
@@ -64,6 +65,13 @@ def demonstrate(steps=2, shape=(4, 6)):
     action = Action(np.eye(4), gripper_open=False, allow_collisions=True)
     keyframes = tuple(Keyframe(observe(shape=shape), action) for _ in range(steps))
     return Demonstration(keyframes, observe(shape=shape), "some/task", instructions=("do it",))
+
+
+class Plain(Remembering):
+    """Cannot be told what is meant."""
+
+    def act(self, observation):
+        return super().act(observation)
 
 
 class Refusing(Remembering):

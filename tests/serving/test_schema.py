@@ -130,7 +130,7 @@ def test_more_points_or_keyframes_than_allowed_are_refused():
 
 
 def test_an_empty_message_asks_for_nothing():
-    with pytest.raises(InvalidInput, match="message: is empty"):
+    with pytest.raises(InvalidInput, match="message: asks for nothing"):
         schema.to_request({}, LIMITS)
     assert schema.to_request({"reset": True}, LIMITS).observation is None
 

@@ -5,6 +5,7 @@ import time
 import urllib.request
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from multiprocessing import active_children
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from imop.errors import InvalidInput
 from imop.serving import Limits, Server, schema, wire
+from imop.serving.limits import WorkerEnded
 from imop.serving.server import is_loopback
 from tests.serving.policies import CRASH, GREEDY, NAP, SLEEP, UNSURE, Refusing, Remembering, demonstrate
 from tests.serving.running import Running, ask, ask_once, message, place, serving
@@ -133,7 +135,7 @@ def test_eight_clients_of_whom_five_misbehave_lose_nothing_of_the_others_episode
         (os.urandom(100), "InvalidInput: message"),
         ("text", "InvalidInput: message: a text"),
         (wire.pack([1]), "InvalidInput: message: a list"),
-        (wire.pack({}), "InvalidInput: message: is empty"),
+        (wire.pack({}), "InvalidInput: message: asks for nothing"),
         (message()[:-10], "InvalidInput: message: cannot be read"),
         (message(prompt="please"), "InvalidInput: prompt: is no field"),
         (message(gripper_opening=7), "InvalidInput: gripper_opening: 7"),
@@ -251,6 +253,16 @@ def test_sessions_take_turns(hasty):
     # Nobody gets far ahead; whose first request is late may be one turn behind.
     ahead = [done[:k].count(a) - done[:k].count(b) for k in range(13) for a in "abc" for b in "abc"]
     assert max(ahead) <= 2
+
+
+def test_a_server_without_a_process_for_sessions_ends_and_says_so():
+    others = set(active_children())
+    with serving(demonstrations=[demonstrate()]) as server, server.join() as client:
+        (host,) = set(active_children()) - others
+        host.kill()
+        assert code_of(client) == 1001
+        server.stop()
+        assert isinstance(server.failure, WorkerEnded)
 
 
 def test_what_the_policy_says_against_a_preloaded_demonstration_is_raised():

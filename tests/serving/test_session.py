@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 
+from imop.geometry.focus import Focus
 from imop.serving import schema, wire
 from imop.serving.limits import Limits
 from imop.serving.session import Outcome, Session
-from tests.serving.policies import BUG, UNSURE, Remembering, demonstrate
+from tests.serving.policies import BUG, UNSURE, Plain, Remembering, demonstrate
 from tests.serving.running import message, place
 
 
@@ -59,3 +60,30 @@ def test_a_reply_has_the_pose_as_a_row_and_the_time_it_took(session):
     reply = answer(session, 0.5)
     assert np.array_equal(reply["actions"], [[0.5, 1, 0, 0, 0, 0, 1, 0, 1]])
     assert reply["server_timing"]["wait_ms"] == 1.0 and reply["server_timing"]["infer_ms"] > 0
+
+
+def test_the_policy_is_told_what_is_meant():
+    policy = Remembering()
+    session = Session(Remembering, policy, 1, Limits())
+    mask = np.eye(4, 6, dtype=bool)
+    focus = Focus({"front": mask}, [[1, 2, 3]], [[0, 0, 0], [1, 1, 1]])
+    answer(session, focus=schema.focus_fields(focus))
+    assert np.array_equal(policy.meant.masks["front"], mask)
+    assert np.array_equal(policy.meant.points, focus.points) and np.array_equal(policy.meant.box, focus.box)
+    answer(session)
+    assert policy.meant is None
+
+
+@pytest.mark.parametrize(
+    ("make", "focus", "said"),
+    [
+        (Plain, {"points": np.zeros((1, 3))}, "focus: this server's policy takes none"),
+        (Remembering, {}, "focus.focus: says nothing"),
+        (Remembering, {"masks": {"front": "all"}}, "focus.front: "),
+        (Remembering, {"box": np.zeros((3, 3))}, "focus.box: shape"),
+        (Remembering, {"click": [1, 2]}, "focus.click: is no field"),
+    ],
+)
+def test_what_is_wrong_with_a_focus_is_named(make, focus, said):
+    reply = Session(make, make(), 1, Limits()).reply(message(focus=focus), {})
+    assert reply.outcome is Outcome.FAILED and said in reply.content.decode().strip().splitlines()[-1]

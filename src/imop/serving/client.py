@@ -4,12 +4,15 @@ import re
 from collections.abc import Sequence
 from contextlib import suppress
 from types import TracebackType
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from imop.errors import ImopError, InvalidInput, NoConfidentMatch
 from imop.extras import extra
 from imop.serving import schema, wire
 from imop.types import Action, Demonstration, Observation
+
+if TYPE_CHECKING:
+    from imop.geometry.focus import Focus
 
 with extra("serve"):
     from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
@@ -77,8 +80,12 @@ class Client:
         """Begin a new episode, with the next observation."""
         self._reset = True
 
-    def act(self, observation: Observation) -> Action:
+    def act(self, observation: Observation, focus: "Focus | None" = None) -> Action:
         """The action for what is seen now.
+
+        Args:
+            observation: what is seen.
+            focus: which thing is meant, if a person, a detector or a click says so.
 
         Raises:
             InvalidInput: if the server says that the observation or a demonstration is not as it should be.
@@ -88,8 +95,11 @@ class Client:
         fields = {**schema.observation_fields(observation), "reset": self._reset}
         if self._unsent:
             fields["demonstrations"] = [schema.demonstration_fields(one) for one in self._unsent]
-        reply = self._ask(fields)
+        if focus is not None:
+            fields["focus"] = schema.focus_fields(focus)
+        # Whatever comes back, the server has heard this, or there is nobody to hear it a second time.
         self._reset, self._unsent = False, ()
+        reply = self._ask(fields)
         self.timing = reply.get("server_timing", {})
         return schema.to_action(reply)
 

@@ -1,6 +1,7 @@
 """`imop serve`: the policy behind a socket."""
 
 import asyncio
+import logging
 import os
 import signal
 from functools import partial
@@ -67,6 +68,8 @@ def serve(
     shown = [] if demo is None else [load_demonstration(demo, demo_episode)]
     make = partial(make_served, method, weights, min_confidence, second_try, robot)
     key = os.environ.get(KEY)
+    logging.basicConfig(format="%(asctime)s %(message)s")
+    logging.getLogger("imop.serving").setLevel(logging.INFO)
     server = Server(make, shown, host, port, key, limits, workers, {"method": method})
     try:
         asyncio.run(_run(server, host))

@@ -1,6 +1,7 @@
 """One client's connection: a message, a reply, and so on, until either side ends it."""
 
 import asyncio
+import logging
 import time
 import traceback
 from collections.abc import Coroutine
@@ -18,6 +19,7 @@ with extra("serve"):
     from websockets.asyncio.server import ServerConnection
     from websockets.frames import CloseCode
 
+logger = logging.getLogger(__name__)
 T = TypeVar("T")
 
 
@@ -66,10 +68,13 @@ class Conversation:
         while (message := await self._next()) is not None:
             started = time.perf_counter()
             reply = await self._while_connected(self._reply(message, prev_total_ms))
+            del message
             if reply is None:
                 return
-            answered = reply.outcome is Outcome.ANSWERED
-            await self._send(reply.content if answered else reply.content.decode())
+            if reply.outcome is Outcome.ANSWERED:
+                await self._send(reply.content)
+            else:
+                await self._send_error(reply.content.decode())
             if reply.outcome is Outcome.FAILED:
                 await self._client.close(CloseCode.INTERNAL_ERROR, "the frame before says what went wrong")
                 return
@@ -93,6 +98,11 @@ class Conversation:
     async def _send(self, message: bytes | str) -> None:
         async with asyncio.timeout(self._shared.limits.idle_seconds):
             await self._client.send(message)
+
+    async def _send_error(self, text: str) -> None:
+        # Quoted, for it may repeat what a stranger sent.
+        logger.warning("%s: %r", self._client.remote_address, text.strip().rpartition("\n")[2])
+        await self._send(text)
 
     async def _while_connected(self, asked: Coroutine[Any, Any, T]) -> T | None:
         """What is asked for, or None if the client leaves first: nobody shall work for who is gone."""

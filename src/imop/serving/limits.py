@@ -43,7 +43,8 @@ class TimeLimitExceeded(ImopError):
 
 
 class WorkerEnded(ImopError):
-    """The process that worked for a session is gone; its session is ended."""
+    """A process is gone: that of a session, which is ended with it, or the one that sessions come from."""
 
-    def __init__(self) -> None:
-        super().__init__("request: the process that worked on it ended; remedy: connect again")
+    def __init__(self, what: str = "request", remedy: str = "connect again"):
+        self.what, self.remedy = what, remedy
+        super().__init__(f"{what}: the process that worked on it ended; remedy: {remedy}")

@@ -6,13 +6,16 @@ errors name the entry, such as views.front.depth.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from imop.errors import InvalidInput
 from imop.serving.limits import Limits
-from imop.types import Action, CameraView, Demonstration, Keyframe, Match, Observation
+from imop.types import Action, CameraView, Demonstration, Keyframe, Match, Observation, as_array
+
+if TYPE_CHECKING:
+    from imop.geometry.focus import Focus
 
 PROTOCOL = 1
 """Version of these names; a server says it in its metadata."""
@@ -26,6 +29,8 @@ T = TypeVar("T")
 _VIEW = ("rgb", "depth", "intrinsics", "T_world_camera")
 _OBSERVATION = ("views", "T_world_gripper", "gripper_opening")
 _OBSERVATION_MAY = ("time_step", "joint_positions")
+_REQUEST_MAY = ("reset", "demonstrations", "focus")
+_FOCUS_MAY = ("masks", "points", "box")
 _ACTION = ("T_world_gripper", "gripper_open")
 _ACTION_MAY = ("allow_collisions",)
 _REPLY_MAY = ("confidence", "reachable", "match", "actions", "server_timing")
@@ -40,11 +45,13 @@ class Request:
         reset: whether a new episode begins.
         demonstrations: what the session shall know instead of what it knew; empty leaves it as it is.
         observation: what is seen, or None if no action is asked for.
+        focus: which thing of the observation is meant, if somebody said so.
     """
 
     reset: bool
     demonstrations: tuple[Demonstration, ...]
     observation: Observation | None
+    focus: "Focus | None" = None
 
 
 def to_request(message: Any, limits: Limits, time_step: int = 0) -> Request:
@@ -58,17 +65,19 @@ def to_request(message: Any, limits: Limits, time_step: int = 0) -> Request:
     Raises:
         InvalidInput: if something is missing, unknown, malformed or too large.
     """
-    fields = _fields("message", message, (), ("reset", "demonstrations", *_OBSERVATION, *_OBSERVATION_MAY))
+    fields = _fields("message", message, (), (*_REQUEST_MAY, *_OBSERVATION, *_OBSERVATION_MAY))
     reset = _flag("reset", fields.pop("reset", False))
+    focus = fields.pop("focus", None)
     shown = _list("demonstrations", fields.pop("demonstrations", []))
     steps = sum(len(s) for d in shown if isinstance(d, dict) and isinstance(s := d.get("keyframes"), list))
     if steps > limits.keyframes:
         raise InvalidInput("demonstrations", f"{steps} keyframes", f"at most {limits.keyframes}")
     demonstrations = _each("demonstrations", lambda one: to_demonstration(one, limits), shown)
-    if not fields and not reset and not demonstrations:
-        raise InvalidInput("message", "is empty", "an observation, demonstrations, or reset = True")
+    if not fields and (focus is not None or not (reset or demonstrations)):
+        raise InvalidInput("message", "asks for nothing", "an observation, demonstrations, or reset = True")
     observation = to_observation({"time_step": time_step, **fields}, limits) if fields else None
-    return Request(reset, tuple(demonstrations), observation)
+    meant = None if focus is None else _within("focus", _to_focus, focus)
+    return Request(reset, tuple(demonstrations), observation, meant)
 
 
 def observation_fields(observation: Observation) -> Fields:
@@ -91,6 +100,12 @@ def observation_fields(observation: Observation) -> Fields:
     if observation.joint_positions is not None:
         fields["joint_positions"] = observation.joint_positions
     return fields
+
+
+def focus_fields(focus: "Focus") -> Fields:
+    """What is meant, in the ways in which it was said."""
+    said = {name: getattr(focus, name) for name in _FOCUS_MAY}
+    return {name: value for name, value in said.items() if value is not None}
 
 
 def to_observation(value: Any, limits: Limits) -> Observation:
@@ -176,6 +191,17 @@ def _to_shown_action(value: Any) -> Action:
         _flag("gripper_open", fields["gripper_open"]),
         _flag("allow_collisions", fields.get("allow_collisions", False)),
     )
+
+
+def _to_focus(value: Any) -> "Focus":
+    # Clients do without what it imports.
+    from imop.geometry.focus import Focus
+
+    fields = _fields("focus", value, (), _FOCUS_MAY)
+    if "masks" in fields:
+        masks = _names("masks", fields["masks"])
+        fields["masks"] = {name: as_array(name, mask, (None, None), np.bool_) for name, mask in masks.items()}
+    return Focus(**fields)
 
 
 def _to_keyframe(value: Any, limits: Limits) -> Keyframe:

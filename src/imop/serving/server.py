@@ -8,6 +8,8 @@ session has one at a time, so that each gets its turn.
 import asyncio
 import hmac
 import logging
+import os
+import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -39,9 +41,10 @@ HEALTH = "/healthz"
 # A client that does not answer a ping for so long is gone, seconds; while it plans it may be slow to.
 PATIENCE = 60.0
 
+logger = logging.getLogger(__name__)
 # It writes a traceback for every stranger who does not speak the protocol.
-_logger = logging.getLogger(__name__)
-_logger.setLevel(logging.CRITICAL)
+_of_protocol = logging.getLogger(f"{__name__}.protocol")
+_of_protocol.setLevel(logging.CRITICAL)
 
 
 class Server:
@@ -58,7 +61,8 @@ class Server:
         metadata: what clients are told besides version and limits.
 
     Raises:
-        InvalidInput: for an address other than loopback without a key, or `workers` below 1.
+        InvalidInput: for an address other than loopback without a key, `workers` below 1, or a system that
+            cannot fork processes.
         MissingExtra: if the extra `serve` is not installed.
     """
 
@@ -76,6 +80,8 @@ class Server:
         if not key and not is_loopback(host):
             problem = f"{host} can be reached by others, and there is no key"
             raise InvalidInput("host", problem, "127.0.0.1, or a key (IMOP_API_KEY for imop serve)")
+        if not hasattr(os, "fork"):
+            raise InvalidInput("platform", sys.platform, "Linux or macOS; clients run anywhere")
         workers = cpu_count() if workers is None else workers
         if workers < 1:
             raise InvalidInput("workers", f"{workers}", "a number from 1 on")
@@ -123,7 +129,7 @@ class Server:
             max_size=self._limits.message_bytes,
             max_queue=1,
             ping_timeout=PATIENCE,
-            logger=_logger,
+            logger=_of_protocol,
         )
         async with server:
             started(next(iter(server.sockets)).getsockname()[1])
@@ -137,7 +143,7 @@ class Server:
                     conversation.cancel()
                 raise
         if not ended.cancelled():
-            raise WorkerEnded
+            raise WorkerEnded("server", "start it again; if it was out of memory, with fewer sessions")
 
     def _description(self) -> dict[str, Any]:
         cameras = {name for one in self._demonstrations for name in one.keyframes[0].observation.views}
@@ -169,11 +175,13 @@ class Server:
             await client.close(CloseCode.TRY_AGAIN_LATER, "too many sessions")
             return
         self._conversations.add(task)
+        logger.info("%s came", client.remote_address)
         try:
             with suppress(ConnectionClosed):
                 await Conversation(client, shared).hold()
         finally:
             self._conversations.discard(task)
+            logger.info("%s left", client.remote_address)
 
 
 def is_loopback(host: str) -> bool:

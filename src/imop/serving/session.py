@@ -1,5 +1,6 @@
 """One client's conversation: its requests are answered by a policy of its own."""
 
+import inspect
 import time
 import traceback
 from collections.abc import Callable, Sequence
@@ -11,6 +12,7 @@ import numpy as np
 
 from imop.errors import InvalidInput, NoConfidentMatch
 from imop.geometry import se3
+from imop.geometry.focus import Focus
 from imop.serving import schema, wire
 from imop.serving.limits import Limits
 from imop.types import Action, Demonstration, FloatArray, Observation
@@ -61,7 +63,7 @@ class Session:
         self._actions = 0
         policy.reset()
 
-    def reply(self, message: bytes, timing: dict[str, float]) -> Reply:
+    def reply(self, message: bytes | bytearray, timing: dict[str, float]) -> Reply:
         """The reply to a message; whatever goes wrong is told as openpi tells it, by the traceback.
 
         Args:
@@ -75,7 +77,7 @@ class Session:
         except Exception:
             return Reply(Outcome.FAILED, traceback.format_exc().encode())
 
-    def _answer(self, message: bytes, timing: dict[str, float]) -> bytes:
+    def _answer(self, message: bytes | bytearray, timing: dict[str, float]) -> bytes:
         started = time.perf_counter()
         request = schema.to_request(wire.unpack(message), self._limits, self._actions)
         if request.demonstrations:
@@ -84,7 +86,7 @@ class Session:
             self._begin()
         fields: schema.Fields = {}
         if request.observation is not None:
-            action = self._act(request.observation)
+            action = self._act(request.observation, request.focus)
             fields = {**schema.action_fields(action), "actions": row(action)[None]}
         infer_ms = (time.perf_counter() - started) * 1e3
         return wire.pack({**fields, "server_timing": {**timing, "infer_ms": infer_ms}})
@@ -101,11 +103,16 @@ class Session:
         self._policy.reset()
         self._actions = 0
 
-    def _act(self, observation: Observation) -> Action:
+    def _act(self, observation: Observation, focus: Focus | None) -> Action:
         if not self._watched:
             accepted = "demonstrations in this message or before, or a server that was started with --demo"
             raise InvalidInput("demonstrations", "none was preloaded or sent", accepted)
-        action = self._policy.act(observation)
+        if focus is None:
+            action = self._policy.act(observation)
+        elif "focus" in inspect.signature(self._policy.act).parameters:
+            action = self._policy.act(observation, focus=focus)  # type: ignore[call-arg]
+        else:
+            raise InvalidInput("focus", "this server's policy takes none", "an observation without it")
         self._actions += 1
         return action
 

@@ -35,7 +35,7 @@ def pack(value: Any) -> bytes:
     return packed
 
 
-def unpack(message: bytes) -> Any:
+def unpack(message: bytes | bytearray) -> Any:
     """What a message holds; its arrays are read-only and share its memory.
 
     Raises:

@@ -12,7 +12,6 @@ import gc
 import multiprocessing
 import os
 import pickle
-import resource
 import signal
 import socket
 import struct
@@ -212,7 +211,7 @@ def _serve(connection: socket.socket, session: Session, limits: Limits) -> None:
         if (message := _receive(connection, length)) is None:
             return
         timing = {"wait_ms": wait_ms} | ({"prev_total_ms": prev_total_ms} if prev_total_ms else {})
-        reply = session.reply(bytes(message), timing)
+        reply = session.reply(message, timing)
         del message
         connection.sendall(_REPLY.pack(reply.outcome.value, len(reply.content)))
         connection.sendall(reply.content)
@@ -220,6 +219,8 @@ def _serve(connection: socket.socket, session: Session, limits: Limits) -> None:
 
 def _limit_memory(more: int) -> None:
     """Let this process take so many bytes more than it has now, where the system can tell."""
+    import resource  # only where processes can be forked
+
     statm = Path("/proc/self/statm")
     if statm.exists():
         _, hard = resource.getrlimit(resource.RLIMIT_AS)
