@@ -1,13 +1,14 @@
 """What `imop serve` adds to a decision, and whether its memory is steady.
 
     python benchmarks/serving.py --json FILE
-    python benchmarks/serving.py --larger 5 --json FILE
+    python benchmarks/serving.py --larger 5 --method benchmarks.serving:Idle --json FILE
     python benchmarks/serving.py --requests 1000 --json FILE
 
 The same policy is asked in this process and through the server for the same recorded states, one after the
-other, so that the ratio depends little on what else the machine does. `--larger 5` makes images of 640 x 640
-of the simulation's 128 x 128, as a real camera sends them. With `--requests` the server alone is asked so
-often, in episodes one after the other, and the memory of all its processes is read in between.
+other, so that the ratio depends little on what else the machine does. The second line is about transport
+alone: a policy that does nothing gets images of 640 x 640 instead of the simulation's 128 x 128, from four
+cameras. With `--requests` the server alone is asked so often, in episodes one after the other, and the memory
+of all its processes is read in between.
 """
 
 import json
@@ -19,7 +20,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import cycle, islice
 from pathlib import Path
@@ -34,7 +35,7 @@ from imop.files import replaced
 from imop.serving import Client
 from imop.tasks.env import make_task
 from imop.tasks.expert import record_demonstration
-from imop.types import CameraView, Demonstration, Observation
+from imop.types import Action, CameraView, Demonstration, Observation
 
 
 @dataclass
@@ -56,6 +57,20 @@ class Options:
     larger: int = 1
     requests: int = 0
     json: Path | None = None
+
+
+class Idle:
+    """Decides in no time."""
+
+    def watch(self, demonstration: Demonstration) -> None:
+        """Nothing is remembered."""
+
+    def reset(self) -> None:
+        """Nothing was."""
+
+    def act(self, observation: Observation) -> Action:
+        """Stay there."""
+        return Action(observation.T_world_gripper, True)
 
 
 def enlarged(view: CameraView, times: int) -> CameraView:
@@ -85,7 +100,7 @@ def serving(options: Options, shown: Demonstration) -> Iterator[tuple[int, int]]
         store = DemonstrationStore.create(Path(folder) / "shown")
         store.append(shown)
         command = [sys.executable, "-u", "-m", "imop.cli", "serve", "--demo", str(store.path)]
-        command += ["--method", options.method, "--port", "0"]
+        command += ["--method", options.method, "--port", "0", "--request-seconds", "3600"]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
             assert server.stdout is not None
             port = re.search(r":(\d+)$", server.stdout.readline().strip())
@@ -159,8 +174,10 @@ def memory(pid: int) -> float:
     """MiB of all processes of a server; what several share counts once."""
     total = 0
     for one in family(pid):
-        lines = Path(f"/proc/{one}/smaps_rollup").read_text().splitlines()
-        total += sum(int(line.split()[1]) for line in lines if line.startswith("Pss:"))
+        # It may have ended since.
+        with suppress(OSError):
+            lines = Path(f"/proc/{one}/smaps_rollup").read_text().splitlines()
+            total += sum(int(line.split()[1]) for line in lines if line.startswith("Pss:"))
     return total / 1024
 
 

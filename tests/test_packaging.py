@@ -18,6 +18,7 @@ MODULES = {
     "train": ("lightning_fabric", "tensorboard"),
     "baselines": ("open3d",),
     "cluster": ("ray",),
+    "serve": ("msgpack", "websockets"),
 }
 EVERY = tuple(module for modules in MODULES.values() for module in modules)
 # Imports every module; prints which extra it lacks, or a dash.
@@ -73,6 +74,9 @@ def test_the_base_is_all_that_a_policy_needs(base_only, package):
         ("imop.evaluation.picture", "viz"),
         ("imop.evaluation.video", "viz"),
         ("imop.evaluation.appearance", "sim"),
+        ("imop.serving.client", "serve"),
+        ("imop.serving.server", "serve"),
+        ("imop.serving.command", "-"),
         ("imop.training.config", "-"),
         ("imop.training.stage", "sim"),
     ],

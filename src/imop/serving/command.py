@@ -64,7 +64,13 @@ def serve(
     from imop.demos.load import load_demonstration
     from imop.serving.server import Server
 
-    limits = Limits(sessions, message_mib * 2**20, points, Limits.keyframes, request_seconds, idle_seconds)
+    limits = Limits(
+        sessions=sessions,
+        message_bytes=message_mib * 2**20,
+        points=points,
+        request_seconds=request_seconds,
+        idle_seconds=idle_seconds,
+    )
     shown = [] if demo is None else [load_demonstration(demo, demo_episode)]
     make = partial(make_served, method, weights, min_confidence, second_try, robot)
     key = os.environ.get(KEY)

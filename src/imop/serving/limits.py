@@ -23,7 +23,7 @@ class Limits:
     message_bytes: int = 128 * 2**20
     points: int = 4_000_000
     keyframes: int = 200
-    request_seconds: float = 120.0
+    request_seconds: float = 300.0
     idle_seconds: float = 900.0
     session_bytes: int = 4 * 2**30
 

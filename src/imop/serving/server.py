@@ -9,6 +9,7 @@ import asyncio
 import hmac
 import logging
 import os
+import socket
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
@@ -61,8 +62,8 @@ class Server:
         metadata: what clients are told besides version and limits.
 
     Raises:
-        InvalidInput: for an address other than loopback without a key, `workers` below 1, or a system that
-            cannot fork processes.
+        InvalidInput: for an address other than loopback without a key, a port that is none, `workers` below 1, or
+            a system that cannot fork processes.
         MissingExtra: if the extra `serve` is not installed.
     """
 
@@ -82,6 +83,8 @@ class Server:
             raise InvalidInput("host", problem, "127.0.0.1, or a key (IMOP_API_KEY for imop serve)")
         if not hasattr(os, "fork"):
             raise InvalidInput("platform", sys.platform, "Linux or macOS; clients run anywhere")
+        if not 0 <= port < 2**16:
+            raise InvalidInput("port", f"{port}", "0 .. 65535")
         workers = cpu_count() if workers is None else workers
         if workers < 1:
             raise InvalidInput("workers", f"{workers}", "a number from 1 on")
@@ -105,23 +108,24 @@ class Server:
             started: is called with the port when clients can connect.
 
         Raises:
+            InvalidInput: if the address cannot be listened at.
             ImopError: what the policy says against a demonstration.
             WorkerEnded: if the process that sessions come from ends.
-            OSError: if the address cannot be listened at.
         """
-        with tempfile.TemporaryDirectory(prefix="imop-") as folder:
+        # Bound before all that takes long; who connects is refused until somebody listens.
+        with bound(*self._address) as address, tempfile.TemporaryDirectory(prefix="imop-") as folder:
             path = Path(folder) / "host"
             host = await Host.start(self._make, self._demonstrations, self._limits, path)
             shared = Shared(host, self._limits, self._turn, self._stopping, self._metadata)
             try:
-                await self._listen(shared, started)
+                await self._listen(address, shared, started)
             finally:
                 host.close()
 
-    async def _listen(self, shared: Shared, started: Callable[[int], None]) -> None:
+    async def _listen(self, address: socket.socket, shared: Shared, started: Callable[[int], None]) -> None:
         server = await serve(
             lambda client: self._handle(client, shared),
-            *self._address,
+            sock=address,
             process_request=self._admit,
             # A page in a browser says where it is from, and has no business here.
             origins=[None],
@@ -132,7 +136,7 @@ class Server:
             logger=_of_protocol,
         )
         async with server:
-            started(next(iter(server.sockets)).getsockname()[1])
+            started(address.getsockname()[1])
             ended, _ = await race(shared.host.ended(), self._stopping.wait())
             self._stopping.set()
             try:
@@ -170,7 +174,8 @@ class Server:
 
     async def _handle(self, client: ServerConnection, shared: Shared) -> None:
         task = asyncio.current_task()
-        if len(self._conversations) >= self._limits.sessions or task is None:
+        assert task is not None
+        if len(self._conversations) >= self._limits.sessions:
             # Several were let in before the first of them was counted.
             await client.close(CloseCode.TRY_AGAIN_LATER, "too many sessions")
             return
@@ -179,6 +184,9 @@ class Server:
         try:
             with suppress(ConnectionClosed):
                 await Conversation(client, shared).hold()
+        except Exception:
+            logger.exception("%s", client.remote_address)
+            raise
         finally:
             self._conversations.discard(task)
             logger.info("%s left", client.remote_address)
@@ -190,6 +198,24 @@ def is_loopback(host: str) -> bool:
         return host == "localhost" or ip_address(host).is_loopback
     except ValueError:
         return False
+
+
+def bound(host: str, port: int) -> socket.socket:
+    """A socket at an address, which does not listen yet.
+
+    Raises:
+        InvalidInput: if there is no such address, or its port is taken.
+    """
+    try:
+        found = socket.getaddrinfo(host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+        family, kind, protocol, _, address = found[0]
+        made = socket.socket(family, kind, protocol)
+        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        made.bind(address)
+    except OSError as error:
+        problem = f"cannot listen at {host}:{port} ({error})"
+        raise InvalidInput("port", problem, "an address of this machine, and a port that is free") from error
+    return made
 
 
 def _has_key(request: Request, key: str) -> bool:

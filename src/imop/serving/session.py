@@ -92,8 +92,9 @@ class Session:
         return wire.pack({**fields, "server_timing": {**timing, "infer_ms": infer_ms}})
 
     def _watch(self, demonstrations: Sequence[Demonstration]) -> None:
-        self._watched = 0
-        self._policy = self._make()
+        if self._watched:
+            # No policy forgets a demonstration, and to make one takes a second.
+            self._policy = self._make()
         for demonstration in demonstrations:
             self._policy.watch(demonstration)
         self._watched = len(demonstrations)

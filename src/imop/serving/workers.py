@@ -7,16 +7,15 @@ session that is over gives everything back.
 """
 
 import asyncio
-import contextlib
 import gc
 import multiprocessing
 import os
-import pickle
 import signal
 import socket
 import struct
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -31,6 +30,7 @@ _REQUEST = struct.Struct("!Qdd")
 # Of a reply: its outcome and length.
 _REPLY = struct.Struct("!BQ")
 _PID = struct.Struct("!q")
+_THREADS = "OMP_NUM_THREADS"
 
 
 class Worker:
@@ -58,7 +58,7 @@ class Worker:
         """End the process, whatever it is doing."""
         # If it has ended by itself, another process may have its number.
         if not self._reader.at_eof():
-            with contextlib.suppress(ProcessLookupError):
+            with suppress(ProcessLookupError):
                 os.kill(self._pid, signal.SIGKILL)
         self._writer.transport.abort()
 
@@ -76,7 +76,7 @@ class Host:
         """A host whose policy has watched the demonstrations.
 
         Args:
-            make: a policy that has watched nothing; is pickled.
+            make: makes a policy that has watched nothing; is pickled.
             demonstrations: what every session knows at first.
             limits: of a session.
             path: of the socket, in a folder that nobody else may enter.
@@ -87,10 +87,10 @@ class Host:
         """
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
-        # Pickled here, for the host has to choose its number of threads before it imports the policy.
-        pickled = pickle.dumps((make, demonstrations, limits))
-        process = context.Process(target=_host, args=(pickled, str(path), theirs), name="imop-host")
-        process.start()
+        arguments = make, demonstrations, limits, path, theirs
+        process = context.Process(target=_host, args=arguments, name="imop-host")
+        with _one_thread():
+            process.start()
         theirs.close()
         host = cls(process, ours, path)
         try:
@@ -99,7 +99,8 @@ class Host:
         except BaseException as error:
             host.close()
             if isinstance(error, EOFError):
-                raise WorkerEnded from error
+                remedy = "read what it printed; scripts need the line `if __name__ == '__main__':`"
+                raise WorkerEnded("server", remedy) from error
             raise
         if failure is not None:
             host.close()
@@ -152,16 +153,36 @@ async def _readable(pipe: "Connection[None, Exception | None]") -> None:
         loop.remove_reader(pipe.fileno())
 
 
-def _host(pickled: bytes, path: str, server: "Connection[Exception | None, None]") -> None:
-    # Threads of OpenMP do not survive a fork, and sessions share the cores among each other.
-    os.environ["OMP_NUM_THREADS"] = "1"
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Processes that are started in here do without threads of OpenMP: these do not survive a fork.
+
+    Several sessions make better use of the cores than several threads of one.
+    """
+    before = os.environ.get(_THREADS)
+    os.environ[_THREADS] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_THREADS]
+        else:
+            os.environ[_THREADS] = before
+
+
+def _host(
+    make: MakePolicy,
+    demonstrations: Sequence[Demonstration],
+    limits: Limits,
+    path: Path,
+    server: "Connection[Exception | None, None]",
+) -> None:
     # Ctrl-C and a service manager tell all processes at once; only the server may decide to end a step.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     # The kernel clears away sessions that are over.
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     try:
-        make, demonstrations, limits = pickle.loads(pickled)
         policy = make()
         for demonstration in demonstrations:
             policy.watch(demonstration)
@@ -174,18 +195,18 @@ def _host(pickled: bytes, path: str, server: "Connection[Exception | None, None]
     gc.collect()
     gc.freeze()
     with socket.socket(socket.AF_UNIX) as listener:
-        listener.bind(path)
+        listener.bind(str(path))
         listener.listen(limits.sessions)
         server.send(None)
         # The pipe is at its end when the server is gone, however it ended.
         while server not in wait([listener, server]):
             connection, _ = listener.accept()
             with connection:
-                _fork(lambda: _serve(connection, session, limits))  # noqa: B023 (called at once)
+                _fork(connection, session, limits)
 
 
-def _fork(work: Callable[[], None]) -> None:
-    """Do it in another process; where none can be had, nothing is done."""
+def _fork(connection: socket.socket, session: Session, limits: Limits) -> None:
+    """Serve a session in another process; where none can be had, the server finds the connection closed."""
     try:
         if os.fork():
             return
@@ -193,7 +214,8 @@ def _fork(work: Callable[[], None]) -> None:
         traceback.print_exc()
         return
     try:
-        work()
+        _limit_memory(limits.session_bytes)
+        _serve(connection, session)
     except ConnectionError:
         pass  # the server has left
     except BaseException:
@@ -202,9 +224,8 @@ def _fork(work: Callable[[], None]) -> None:
         os._exit(0)
 
 
-def _serve(connection: socket.socket, session: Session, limits: Limits) -> None:
+def _serve(connection: socket.socket, session: Session) -> None:
     """Answer until the server leaves."""
-    _limit_memory(limits.session_bytes)
     connection.sendall(_PID.pack(os.getpid()))
     while (head := _receive(connection, _REQUEST.size)) is not None:
         length, wait_ms, prev_total_ms = _REQUEST.unpack(head)
