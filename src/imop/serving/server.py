@@ -62,8 +62,8 @@ class Server:
         metadata: what clients are told besides version and limits.
 
     Raises:
-        InvalidInput: for an address other than loopback without a key, a port that is none, `workers` below 1, or
-            a system that cannot fork processes.
+        InvalidInput: for an address other than loopback without a key, a port that is none, `workers` below
+            1, or a system that cannot fork processes.
         MissingExtra: if the extra `serve` is not installed.
     """
 
