@@ -153,6 +153,41 @@ def test_an_error_is_a_text_that_names_it_after_which_the_connection_closes(serv
     assert place(ask_once(server, 0.5)) == [0.5, 1, 1]
 
 
+def test_fuzzed_messages_are_answered_or_refused_by_name(server):
+    random = np.random.default_rng(0)
+    for _ in range(25):
+        fuzzed = bytearray(message())
+        for place_of_byte in random.integers(0, len(fuzzed), random.integers(1, 6)):
+            fuzzed[place_of_byte] = random.integers(256)
+        cut = len(fuzzed) if random.random() < 0.7 else random.integers(len(fuzzed))
+        with server.join() as client:
+            client.send(bytes(fuzzed[:cut]))
+            reply = client.recv()
+        if isinstance(reply, str):
+            assert reply.strip().splitlines()[-1].startswith("imop.errors.InvalidInput: ")
+        else:
+            assert "T_world_gripper" in wire.unpack(reply)
+
+
+def test_fuzzed_bytes_on_the_line_harm_nobody(server):
+    random = np.random.default_rng(0)
+    address = ("127.0.0.1", server.port)
+    beginnings = [
+        b"",
+        b"GET / HTTP/1.1\r\n",
+        b"GET /healthz HTTP/1.1\r\nHost: a\r\n",
+        b"POST / HTTP/1.1\r\n\r\n",
+    ]
+    with server.join() as client:
+        for beginning in 3 * beginnings:
+            with socket.create_connection(address) as stranger:
+                stranger.sendall(beginning + random.bytes(200))
+            with server.join() as member:
+                member.socket.sendall(random.bytes(200))
+            assert ask(client, 0.5)["T_world_gripper"][1, 3] > 0
+        assert place(ask(client, 0.5)) == [6.5, 13, 1]
+
+
 def test_low_confidence_is_told_and_the_episode_goes_on(server):
     with server.join() as client:
         ask(client, 0.5)
