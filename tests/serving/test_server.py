@@ -294,6 +294,7 @@ def test_a_server_without_a_process_for_sessions_ends_and_says_so():
     others = set(active_children())
     with serving(demonstrations=[demonstrate()]) as server, server.join() as client:
         (host,) = set(active_children()) - others
+        ask(client)
         host.kill()
         assert code_of(client) == 1001
         server.stop()

@@ -19,6 +19,7 @@ from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
+from typing import NoReturn
 
 from imop.errors import ImopError
 from imop.serving.limits import Limits, WorkerEnded
@@ -180,8 +181,6 @@ def _host(
     # Ctrl-C and a service manager tell all processes at once; only the server may decide to end a step.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
-    # The kernel clears away sessions that are over.
-    signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     try:
         policy = make()
         for demonstration in demonstrations:
@@ -194,6 +193,8 @@ def _host(
     # What is there now stays in use: sessions that look for garbage leave it alone, and so do not copy it.
     gc.collect()
     gc.freeze()
+    # The kernel clears away sessions that are over.
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     with socket.socket(socket.AF_UNIX) as listener:
         listener.bind(str(path))
         listener.listen(limits.sessions)
@@ -202,17 +203,24 @@ def _host(
         while server not in wait([listener, server]):
             connection, _ = listener.accept()
             with connection:
-                _fork(connection, session, limits)
+                if _forked():
+                    # Nobody shall take this process for the host when that is gone.
+                    listener.close()
+                    server.close()
+                    _be_session(connection, session, limits)
 
 
-def _fork(connection: socket.socket, session: Session, limits: Limits) -> None:
-    """Serve a session in another process; where none can be had, the server finds the connection closed."""
+def _forked() -> bool:
+    """Whether this is a new process; where none can be had, the server finds the connection closed."""
     try:
-        if os.fork():
-            return
+        return os.fork() == 0
     except OSError:
         traceback.print_exc()
-        return
+        return False
+
+
+def _be_session(connection: socket.socket, session: Session, limits: Limits) -> NoReturn:
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     try:
         _limit_memory(limits.session_bytes)
         _serve(connection, session)
