@@ -51,16 +51,17 @@ def openpi_python(tmp_path_factory):
 
 @contextmanager
 def imop_serve(*arguments, key):
-    """The port of a server that was started by the command; it ends as by Ctrl-C."""
+    """The port of a server that was started by the command; it ends as by Ctrl-C in a terminal."""
     command = [sys.executable, "-m", "imop.cli", "serve", "--port", "0", *map(str, arguments)]
     environment = {**os.environ, "IMOP_API_KEY": key, "PYTHONUNBUFFERED": "1"}
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as server:
+    options = {"stdout": subprocess.PIPE, "text": True, "env": environment, "start_new_session": True}
+    with subprocess.Popen(command, **options) as server:
         try:
             found = re.search(r"ws://127\.0\.0\.1:(\d+)", server.stdout.readline())
             assert found, "the server said nothing"
             yield int(found[1])
         finally:
-            server.send_signal(signal.SIGINT)
+            os.killpg(server.pid, signal.SIGINT)
             said = server.stdout.read()
     assert server.returncode == 0 and "stopped" in said
 
