@@ -20,6 +20,7 @@ MODULES = {
     "cluster": ("ray",),
     "view": ("viser", "websockets"),
     "calibrate": ("cv2",),
+    "serve": ("msgpack", "websockets"),
 }
 # What brings a module of another name.
 DISTRIBUTIONS = {"cv2": "opencv_python_headless"}
@@ -77,6 +78,9 @@ def test_the_base_is_all_that_a_policy_needs(base_only, package):
         ("imop.evaluation.picture", "viz"),
         ("imop.evaluation.video", "viz"),
         ("imop.evaluation.appearance", "sim"),
+        ("imop.serving.client", "serve"),
+        ("imop.serving.server", "serve"),
+        ("imop.serving.command", "-"),
         ("imop.training.config", "-"),
         ("imop.training.stage", "sim"),
         ("imop.viewing.cases", "-"),

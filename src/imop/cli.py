@@ -18,6 +18,7 @@ from imop.calibration.command import calibrate
 from imop.errors import ImopError, InvalidInput, MissingExtra
 from imop.files import writable_folder
 from imop.reproduce.command import reproduce
+from imop.serving.command import serve
 from imop.terminal import console, list_folder, status
 from imop.training.ablation import Ablation
 from imop.training.config import TrainConfig
@@ -230,6 +231,7 @@ def evaluate(
 
 app.command(reproduce)
 app.command(calibrate)
+app.command(serve)
 app.command(name="import")(cli_data.import_)
 app.command(cli_data.export)
 app.command(cli_data.check)
