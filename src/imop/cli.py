@@ -157,6 +157,7 @@ def evaluate(
     jobs: int = 2,
     weights: Path | None = None,
     baselines: Path | None = None,
+    robot: Literal["panda", "iiwa14", "ur5e"] = "panda",
     out: Path = Path("runs/eval"),
 ) -> int:
     """Success rates of several methods on the same demonstrations and scenes.
@@ -190,6 +191,7 @@ def evaluate(
         weights: folder that `imop train` wrote, for the learned policy; by default the bundled weights.
         baselines: folder of the weights of act3d, rvt, rvt_ft and rvt_hdt (docs/baselines.md); by default
             runs/baselines.
+        robot: the arm, with the Panda's hand; all but the Panda need the extra arms, in the suite tabletop.
         out: folder for the results.
     """
     from imop.evaluation.benchmark import evaluate_suite
@@ -214,6 +216,7 @@ def evaluate(
         second_try,
         demonstrations,
         baselines,
+        robot,
     )
     results.save(out)
     console.print(results.table())

@@ -12,6 +12,7 @@ from imop.robots.panda import T_WORLD_BASE, panda_self_filter
 from imop.types import BoolArray, FloatArray
 
 PANDA = "panda"
+SIMULATED = ("iiwa14", "ur5e")
 _OWN = (
     "a class or function that makes, called without arguments, an object with is_robot and reachable, named "
     "module:object or by an entry point imop.robots"
@@ -34,16 +35,19 @@ def robot_functions(name: str = PANDA) -> tuple[RobotMask, Reachable | None]:
     """The self-filter and the reachability of a robot, in imop's world frame.
 
     Args:
-        name: panda, "module:object", or an entry point of the group imop.robots.
+        name: panda, one of `SIMULATED`, "module:object", or an entry point of the group imop.robots.
 
     Returns:
         Reachability is None for the Panda without the extra sim: then no pose is ruled out.
 
     Raises:
         InvalidInput: if there is no such robot, or it is none.
+        MissingExtra: if the model of one of `SIMULATED` is not installed.
     """
     if name == PANDA:
         return panda_self_filter().is_robot, _panda_reachable()
+    if name in SIMULATED:
+        return _simulated(name)
     robot, T_base_world = _own(name), se3.invert(T_WORLD_BASE)
 
     def is_robot(p_world: FloatArray, joint_positions: FloatArray, gripper_opening: float) -> BoolArray:
@@ -55,11 +59,22 @@ def robot_functions(name: str = PANDA) -> tuple[RobotMask, Reachable | None]:
 def _own(name: str) -> RobotModel:
     factory = plugins.find("robot", name, "imop.robots")
     if not (inspect.isclass(factory) or inspect.isfunction(factory)) or not plugins.takes_nothing(factory):
-        raise InvalidInput("robot", name, f"{PANDA}, or {_OWN}")
+        raise InvalidInput("robot", name, f"{PANDA}, {', '.join(SIMULATED)}, or {_OWN}")
     robot = factory()
     if not all(callable(getattr(robot, part, None)) for part in ("is_robot", "reachable")):
         raise InvalidInput("robot", f"{name} makes a {type(robot).__name__}", _OWN)
     return cast(RobotModel, robot)
+
+
+def _simulated(name: str) -> tuple[RobotMask, Reachable]:
+    from imop.sim.arms import find_arm, self_filter
+
+    arm = find_arm(name)
+
+    def reachable(T_world_gripper: FloatArray) -> bool:
+        return len(arm.kinematics.inverse(T_world_gripper, arm.home, 1)) > 0
+
+    return self_filter(arm).is_robot, reachable
 
 
 def _panda_reachable() -> Reachable | None:

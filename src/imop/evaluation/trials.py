@@ -7,6 +7,7 @@ from functools import cached_property
 from imop.baselines.policy import REGRESSORS
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.splits import chosen_tasks
+from imop.sim.arms import PANDA, find_arm
 from imop.sim.sensing import Sensing
 from imop.tasks.changes import FACTORS, Change, changes_of, read_factors
 from imop.tasks.disturbances import can_happen, require_disturbance
@@ -39,6 +40,7 @@ class Trial:
         disturb: what goes wrong once, see `tasks.disturbances.DISTURBANCES`; nothing if empty.
         second_try: whether the episode goes on after a motion that cannot be planned. It does if disturbed.
         demonstrations: how many are shown, all but the first of other instances that are never tested.
+        robot: the arm that acts, and that showed the demonstrations; see `sim.arms.ARMS`.
 
     Raises:
         InvalidInput: for a negative seed, no demonstration, or an unknown change or disturbance.
@@ -54,6 +56,7 @@ class Trial:
     disturb: str = ""
     second_try: bool = False
     demonstrations: int = 1
+    robot: str = PANDA.name
 
     def __post_init__(self) -> None:
         for name in ("seed", "instance", "shown"):
@@ -103,6 +106,7 @@ class Trial:
             sense=self.changed.tested,
             disturb=self.disturb,
             second_try=self.second_try,
+            arm=find_arm(self.robot),
         )
         env.reset(seed=self.seed, options={"variation": self.variation, "instance_seed": self.instance})
         return env
@@ -139,7 +143,9 @@ def _demonstration(trial: Trial, first_seed: int, instance: int) -> Demonstratio
     task = make_task(trial.task)
     for seed in range(first_seed, first_seed + _RECORDING_ATTEMPTS):
         try:
-            recorded = record_demonstration(task, seed, trial.demonstrated.variation, instance)
+            recorded = record_demonstration(
+                task, seed, trial.demonstrated.variation, instance, arm=find_arm(trial.robot)
+            )
             return _seen(recorded, trial.changed.shown)
         except (ExpertFailed, NoRoom) as error:
             failure: ImopError = error
