@@ -1,4 +1,4 @@
-"""Kinematics of any arm that MuJoCo can read, by mink: differential inverse kinematics with joint limits."""
+"""Kinematics of any arm that MuJoCo can read, by mink: Newton's method, damped, within joint limits."""
 
 import mujoco
 import numpy as np
@@ -16,7 +16,9 @@ _POSITION_TOLERANCE, _ROTATION_TOLERANCE = 1e-5, 1e-4
 _SEARCH_STEPS, _FOLLOW_STEPS = 40, 12
 _STARTS = 14
 """Configurations that a search begins from, besides the reference and the home."""
-_LARGEST_STEP, _DAMPING = 0.5, 1e-6
+_LARGEST_STEP, _DAMPING = 0.5, 1e-3
+_PROGRESS, _PATIENCE = 0.9, 4
+"""A search is given up after so many steps in which the error does not fall below this share."""
 _SAME = 0.02
 """Solutions nearer to each other, radians, are one."""
 
@@ -49,8 +51,6 @@ class MinkKinematics:
         self._q0 = self._configuration.q.copy()
         ids = [model.joint(name).id for name in joints]
         self._qpos, self._dof = model.jnt_qposadr[ids], model.jnt_dofadr[ids]
-        others = np.setdiff1d(np.arange(model.nv), self._dof)
-        self._held = [mink.DofFreezingTask(model, dof_indices=others.tolist())] if len(others) else []
         self._home, self._lower, self._upper = home, lower, upper
         self._T_world_model = T_world_model
         corners = qmc.Halton(len(joints), scramble=False).random(_STARTS + 1)[1:]
@@ -115,17 +115,21 @@ class MinkKinematics:
     def _solve(self, q: FloatArray, T_world_gripper: FloatArray, steps: int) -> FloatArray | None:
         target = se3.invert(self._T_world_model) @ T_world_gripper
         self._task.set_target(mink.SE3.from_matrix(target))
+        best, since = float("inf"), 0
         for _ in range(steps):
             self._put(q)
             error = self._task.compute_error(self._configuration)
             off = np.linalg.norm(error[:3]), np.linalg.norm(error[3:])
             if off[0] < _POSITION_TOLERANCE and off[1] < _ROTATION_TOLERANCE:
                 return q
-            velocity = mink.solve_ik(
-                self._configuration, [self._task], 1.0, "daqp", _DAMPING, limits=[], constraints=self._held
-            )
-            step = np.clip(velocity[self._dof], -_LARGEST_STEP, _LARGEST_STEP)
-            q = np.clip(q + step, self._lower, self._upper)
+            since = 0 if sum(off) < _PROGRESS * best else since + 1
+            if since == _PATIENCE:
+                return None
+            best = min(best, float(sum(off)))
+            J = self._task.compute_jacobian(self._configuration)[:, self._dof]
+            # The task's Jacobian is that of its error, which is to vanish.
+            step = -J.T @ np.linalg.solve(J @ J.T + _DAMPING**2 * np.eye(6), error)
+            q = np.clip(q + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP), self._lower, self._upper)
         return None
 
     def _put(self, q: FloatArray) -> None:
