@@ -201,4 +201,4 @@ def test_a_line_through_a_singularity_is_no_straight_path():
     straight = np.linspace(PANDA_HOME_Q, PANDA_HOME_Q + 0.02, 5)
     swinging = straight.copy()
     swinging[2, 0] += 0.2
-    assert motion._off_line(straight) < 0.002 < motion._off_line(swinging)
+    assert motion._off_line(straight, PANDA) < 0.002 < motion._off_line(swinging, PANDA)
