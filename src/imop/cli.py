@@ -17,6 +17,7 @@ from imop import cli_data
 from imop.errors import ImopError, InvalidInput, MissingExtra
 from imop.files import writable_folder
 from imop.reproduce.command import reproduce
+from imop.setup.command import setup
 from imop.terminal import console, list_folder, status
 from imop.training.ablation import Ablation
 from imop.training.config import TrainConfig
@@ -225,6 +226,7 @@ def evaluate(
 
 
 app.command(reproduce)
+app.command(setup)
 app.command(name="import")(cli_data.import_)
 app.command(cli_data.export)
 app.command(cli_data.check)

@@ -1,13 +1,14 @@
 """The arms that the simulation has, each with the Panda's hand: what a world and a planner know of one."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
 
 from imop.errors import InvalidInput
+from imop.geometry import se3
 from imop.geometry.self_filter import SelfFilter
 from imop.robots.panda import (
     FILTER_MARGIN,
@@ -105,5 +106,32 @@ def find_arm(name: str) -> Arm:
 def self_filter(arm: Arm) -> SelfFilter:
     """The filter that knows the points of an arm, in the world with its base at `arm.T_world_base`."""
     model = arm.spec().compile()
-    margins = {"": FILTER_MARGIN[""], **{finger: FILTER_MARGIN[finger] for finger in FINGERS}}
-    return mjcf_self_filter(model, arm.joints, FINGER_JOINTS, arm.T_world_base, margins)
+    margin, finger_margin = FILTER_MARGIN[""], FILTER_MARGIN[FINGERS[0]]
+    return mjcf_self_filter(model, arm.joints, FINGER_JOINTS, arm.T_world_base, margin, finger_margin)
+
+
+def placed(arm: Arm, T_world_base: FloatArray) -> Arm:
+    """The same arm with its base elsewhere."""
+    return replace(
+        arm, T_world_base=T_world_base, kinematics=_Moved(arm.kinematics, arm.T_world_base, T_world_base)
+    )
+
+
+class _Moved:
+    """Kinematics of an arm whose base was moved."""
+
+    def __init__(self, known: Kinematics, T_world_base: FloatArray, T_new_base: FloatArray):
+        self._known = known
+        self._T_new_world = T_new_base @ se3.invert(T_world_base)
+        self._T_world_new = se3.invert(self._T_new_world)
+
+    def tip_pose(self, q: FloatArray) -> FloatArray:
+        return np.asarray(self._T_new_world @ self._known.tip_pose(q))
+
+    def inverse(
+        self, T_world_gripper: FloatArray, q_reference: FloatArray, limit: int | None = None
+    ) -> FloatArray:
+        return self._known.inverse(self._T_world_new @ T_world_gripper, q_reference, limit)
+
+    def follow(self, poses: FloatArray, q_start: FloatArray) -> FloatArray | None:
+        return self._known.follow(self._T_world_new @ poses, q_start)
