@@ -21,7 +21,7 @@ ALLOWED = {
     "robots": BASE | {"geometry"},
     "cameras": BASE | {"geometry"},
     "setup": BASE | {"geometry", "demos", "robots", "cameras", "sim", "terminal"},
-    "sim": BASE | {"geometry", "robots"},
+    "sim": BASE | {"geometry", "robots", "cameras"},
     "tasks": BASE | {"geometry", "robots", "sim", "plugins"},
     "training": BASE | {"geometry", "demos", "networks", "policy", "robots", "sim"},
     "evaluation": BASE
