@@ -143,6 +143,7 @@ def _shade(world: World, hits: _Hits) -> ByteArray:
 
 
 def view_of(world: World, camera: Camera, width: int, height: int) -> CameraView:
+    """What one camera sees."""
     T, K = camera.T_world_camera(world), camera.intrinsics(width, height)
     hits = _cast(world, T, K, width, height, camera.far)
     bodies = world.model.geom_bodyid[hits.geom]

@@ -1,4 +1,4 @@
-"""The simulated arm and cameras behind the interfaces of real ones, so that everything can be tried on them."""
+"""The simulated arm and cameras behind the interfaces of real ones."""
 
 import threading
 
@@ -58,9 +58,8 @@ class SimulatedRobot:
         """As `Robot.move_to`, with the simulation's own planner, which knows all obstacles."""
         T = self.world.arm.T_world_base @ as_pose("T_base_gripper", T_base_gripper)
         if np.any(T[:3, 3] < self._lower) or np.any(T[:3, 3] > self._upper):
-            return MotionResult(
-                False, "outside_workspace", f"{np.round(T[:3, 3], 3).tolist()} m, world frame"
-            )
+            problem = f"{np.round(T[:3, 3], 3).tolist()} m, world frame"
+            return MotionResult(False, "outside_workspace", problem)
         self._stop.clear()
         try:
             trajectory = plan_for(self.world, T, allow_collisions, straight, self._seed)
