@@ -70,6 +70,12 @@ MODELS = {
     ),
 }
 
+ROTOR = 0.1
+"""Inertia of each joint's rotor as its link feels it, kg m^2, as the Panda's.
+
+Without it what is welded to the hand turns in the hand when a light wrist swings.
+"""
+
 
 def model_file(name: str) -> Path:
     """The MJCF of an arm.
@@ -121,7 +127,8 @@ def arm_spec(model: Model, file: Path) -> Any:
         spec.delete(what)
     joints = {a.name: a.target for a in spec.actuators}
     for name, wanted in zip(model.actuators, model.joints, strict=True):
-        spec.joint(joints[name]).name = wanted
+        joint = spec.joint(joints[name])
+        joint.name, joint.armature = wanted, ROTOR
         actuator = spec.actuator(name)
         actuator.name = actuator.target = wanted
     for body in spec.bodies:
