@@ -33,6 +33,7 @@ ALLOWED = {
         "baselines",
         "training",
         "robots",
+        "setup",
         "sim",
         "tasks",
         "plugins",

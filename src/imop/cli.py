@@ -256,8 +256,8 @@ def predict(
         query_episode: number of the episode to predict.
         base: where the robot's base is in the recordings' frame, metres; by default as in the simulation,
             with a table at a height of 0.752 m.
-        robot: whose points are left out and which poses are reached: panda, or one's own, such as
-            my_robot:MyArm.
+        robot: whose points are left out and which poses are reached: panda, a set-up such as cell.toml, in
+            whose world the recordings are, or one's own, such as my_robot:MyArm.
         method: learned, replay, registration, textbook, or one's own, such as my_methods:MyPolicy.
         weights: folder that `imop train` wrote; by default the bundled weights.
         out: folder for the results.
@@ -267,13 +267,15 @@ def predict(
     from imop.evaluation.predict import draw_predictions, frame_of, predict_recorded, predictions_table
 
     writable_folder(out)
+    if base is not None and robot.endswith((".toml", ".json")):
+        raise InvalidInput("base", f"{base} together with {robot}", "one of the two; a set-up has the base")
     T_imop_world = frame_of(base)
     shown, recorded = load_demonstration(demo, demo_episode), load_demonstration(query, query_episode)
     shown, recorded = moved(shown, T_imop_world), moved(recorded, T_imop_world)
     with status(f"predicting {query}"):
         predictions = predict_recorded(shown, recorded, method, out, weights, T_imop_world, robot)
         try:
-            draw_predictions(shown, recorded, predictions, out / "steps.png")
+            draw_predictions(shown, recorded, predictions, out / "steps.png", robot)
         except MissingExtra as error:
             console.print(f"no steps.png: {error}")
     console.print(predictions_table(predictions))

@@ -2,13 +2,16 @@
 
 import inspect
 from collections.abc import Callable
+from pathlib import Path
 from typing import Protocol, cast
 
 from imop import plugins
 from imop.errors import InvalidInput, MissingExtra
 from imop.geometry import se3
-from imop.geometry.perception import RobotMask
+from imop.geometry.perception import Perception, RobotMask
 from imop.robots.panda import T_WORLD_BASE, panda_self_filter
+from imop.setup.arm import arm_of
+from imop.setup.file import load_setup
 from imop.types import BoolArray, FloatArray
 
 PANDA = "panda"
@@ -29,6 +32,24 @@ class RobotModel(Protocol):
 
     def reachable(self, T_base_gripper: FloatArray) -> bool:
         """Whether the gripper can be taken to a pose (4, 4)."""
+
+
+def perception_for(name: str = PANDA) -> tuple[Perception, Reachable | None]:
+    """What makes clouds without a robot, and which poses it reaches.
+
+    Args:
+        name: the path of a set-up (.toml or .json), whose world and workspace then count, or a name as of
+            `robot_functions`.
+
+    Raises:
+        InvalidInput, CorruptData, MissingExtra: as `load_setup`, `arm_of` and `robot_functions`.
+    """
+    if name.endswith((".toml", ".json")):
+        setup = load_setup(Path(name))
+        arm = arm_of(setup)
+        return arm.perception(setup), arm.reachable
+    is_robot, reachable = robot_functions(name)
+    return Perception(is_robot), reachable
 
 
 def robot_functions(name: str = PANDA) -> tuple[RobotMask, Reachable | None]:
@@ -59,7 +80,9 @@ def robot_functions(name: str = PANDA) -> tuple[RobotMask, Reachable | None]:
 def _own(name: str) -> RobotModel:
     factory = plugins.find("robot", name, "imop.robots")
     if not (inspect.isclass(factory) or inspect.isfunction(factory)) or not plugins.takes_nothing(factory):
-        raise InvalidInput("robot", name, f"{PANDA}, {', '.join(SIMULATED)}, or {_OWN}")
+        raise InvalidInput(
+            "robot", name, f"{PANDA}, {', '.join(SIMULATED)}, a set-up (.toml or .json), or {_OWN}"
+        )
     robot = factory()
     if not all(callable(getattr(robot, part, None)) for part in ("is_robot", "reachable")):
         raise InvalidInput("robot", f"{name} makes a {type(robot).__name__}", _OWN)
