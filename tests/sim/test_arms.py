@@ -50,7 +50,7 @@ def test_the_tip_is_where_the_simulation_has_it(arm, world, rng):
 def test_every_solution_reaches_the_pose_within_the_limits(arm):
     T = se3.make(DOWN @ se3.euler(z=0.4), (0.25, -0.1, 0.9))
     solutions = arm.kinematics.inverse(T, arm.home)
-    assert len(solutions) > 1
+    assert len(solutions) > 0
     for q in solutions:
         assert np.all((q >= arm.lower) & (q <= arm.upper))
         assert se3.near(arm.kinematics.tip_pose(q), T, 2e-5, 2e-4)

@@ -27,7 +27,8 @@ class Model:
         flange: site that the hand is mounted on, z away from the arm.
         turn: of the hand about the flange's z axis, radians.
         velocity: of the joints, radians per second, from the maker's data sheet.
-        home: radians; joints are used up to half a turn to both sides of it.
+        home: radians.
+        spans: how far to both sides of it each joint is used, radians, within the limits of the model.
         p_world_base: metres.
         yaw: of the base in the world, radians.
     """
@@ -40,6 +41,7 @@ class Model:
     turn: float
     velocity: tuple[float, ...]
     home: tuple[float, ...]
+    spans: tuple[float, ...]
     p_world_base: tuple[float, float, float]
     yaw: float = 0.0
 
@@ -54,6 +56,7 @@ MODELS = {
         -3 * np.pi / 4,
         tuple(np.radians((85, 85, 100, 75, 130, 135, 135)).tolist()),
         (0.0, 0.2, 0.0, -1.6, 0.0, 1.3, 0.0),
+        (np.pi,) * 7,
         (-0.268, -0.0064, 0.75),
     ),
     "ur5e": Model(
@@ -65,6 +68,8 @@ MODELS = {
         -np.pi / 4,
         (np.pi,) * 6,
         (-0.28, -1.75, 1.6, -1.42, -1.57, -0.28),
+        # Elbow up and wrist on one side: between other configurations there is no straight way.
+        (np.pi, 1.6, 1.5, np.pi, 1.5, np.pi),
         (-0.268, -0.0064, 0.75),
         np.pi,
     ),
@@ -105,7 +110,7 @@ def make_arm(name: str) -> Arm:
     file = model_file(name)
     compiled = arm_spec(model, file).compile()
     lower, upper = np.array([compiled.joint(joint).range for joint in model.joints]).T
-    lower, upper = np.maximum(lower, home - np.pi), np.minimum(upper, home + np.pi)
+    lower, upper = np.maximum(lower, home - model.spans), np.minimum(upper, home + model.spans)
     T_world_base = se3.make(se3.euler(z=model.yaw), model.p_world_base)
     return Arm(
         name,
