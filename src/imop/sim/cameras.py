@@ -142,8 +142,8 @@ def _shade(world: World, hits: _Hits) -> ByteArray:
     return image
 
 
-def view_of(world: World, camera: Camera, width: int, height: int) -> CameraView:
-    """What one camera sees."""
+def camera_view(world: World, camera: Camera, width: int, height: int) -> CameraView:
+    """What one camera sees, with instance ids for training."""
     T, K = camera.T_world_camera(world), camera.intrinsics(width, height)
     hits = _cast(world, T, K, width, height, camera.far)
     bodies = world.model.geom_bodyid[hits.geom]
@@ -155,7 +155,7 @@ def view_of(world: World, camera: Camera, width: int, height: int) -> CameraView
 
 def render(world: World, size: int = 128, cameras: Mapping[str, Camera] = CAMERAS) -> dict[str, CameraView]:
     """What all cameras see, `size` x `size` pixels."""
-    return {name: view_of(world, camera, size, size) for name, camera in cameras.items()}
+    return {name: camera_view(world, camera, size, size) for name, camera in cameras.items()}
 
 
 def render_view(world: World, camera: str | Camera, width: int = 320, height: int = 240) -> ByteArray:

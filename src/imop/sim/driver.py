@@ -8,7 +8,7 @@ from imop.cameras.interfaces import Frame
 from imop.errors import InvalidInput, PlanFailed
 from imop.geometry import se3
 from imop.robots.interfaces import DONE, MotionResult, RobotState
-from imop.sim.cameras import CAMERAS, Camera, view_of
+from imop.sim.cameras import CAMERAS, Camera, camera_view
 from imop.sim.execute import move, plan_for
 from imop.sim.gripper import set_gripper
 from imop.sim.world import World
@@ -120,5 +120,5 @@ class SimulatedCamera:
 
     def capture(self) -> Frame:
         """What is seen now; the stamp is the simulation's clock."""
-        view = view_of(self._world, self._camera, *self._size)
+        view = camera_view(self._world, self._camera, *self._size)
         return Frame(view.rgb, view.depth, view.intrinsics, self._world.time)
