@@ -40,10 +40,10 @@ test-lowest: install
 	mkdir -p build
 	$(BIN)/python .ci/lowest.py > build/lowest.txt
 	$(BIN)/python -m venv --clear build/lowest
-	build/lowest/bin/pip install --quiet --disable-pip-version-check -c build/lowest.txt -e '.[sim,viz,train]' \
+	build/lowest/bin/pip install --quiet --disable-pip-version-check -c build/lowest.txt -e '.[sim,viz,train,calibrate]' \
 		hypothesis pytest pytest-xdist
 	build/lowest/bin/python -m pytest -n 2 --dist worksteal tests/demos tests/geometry tests/networks tests/policy \
-		tests/robots tests/sim tests/evaluation tests/tasks/coppelia tests/tasks/test_env.py tests/test_cli.py \
+		tests/robots tests/calibration tests/sim tests/evaluation tests/tasks/coppelia tests/tasks/test_env.py tests/test_cli.py \
 		tests/training/test_loop.py tests/training/test_ablation.py tests/training/test_routes.py
 
 # Rewrites constraints.txt from what is installed now.

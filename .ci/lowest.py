@@ -18,7 +18,7 @@ def pins(text: str, sign: str) -> dict[str, str]:
 
 project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 extras = project["optional-dependencies"]
-asked = [*project["dependencies"], *extras["sim"], *extras["viz"], *extras["train"]]
+asked = [*project["dependencies"], *extras["sim"], *extras["viz"], *extras["train"], *extras["calibrate"]]
 tested = pins((ROOT / "constraints.txt").read_text(), "==")
 lowest = tested | pins("\n".join(asked), ">=") | {"torch": tested["torch"]}
 print("\n".join(f"{name}=={version}" for name, version in lowest.items()))

@@ -22,6 +22,7 @@ ALLOWED = {
     "cameras": BASE | {"geometry"},
     "setup": BASE | {"geometry", "demos", "robots", "cameras", "sim", "terminal"},
     "sim": BASE | {"geometry", "robots", "cameras"},
+    "calibration": BASE | {"geometry", "demos", "robots", "cameras", "sim", "setup", "plugins", "terminal"},
     "tasks": BASE | {"geometry", "robots", "sim", "plugins"},
     "training": BASE | {"geometry", "demos", "networks", "policy", "robots", "sim"},
     "evaluation": BASE
@@ -41,6 +42,7 @@ ALLOWED = {
 }
 ALLOWED["terminal"] = set()
 ALLOWED["reproduce"] = ALLOWED["evaluation"] | {"evaluation", "terminal"}
+ALLOWED["viewing"] = ALLOWED["reproduce"] | {"cameras", "setup"}
 
 
 def imports(path):

@@ -14,6 +14,7 @@ from imop.networks.model import load_model
 from imop.robots.panda import T_WORLD_BASE
 from imop.tasks.disturbances import DISTURBANCES
 from imop.training.shards import write_shard
+from imop.viewing.cases import from_result
 from tests.training.test_pairs import pair
 
 VERBS = (
@@ -29,6 +30,7 @@ VERBS = (
     "assets",
     "train",
     "model",
+    "view",
 )
 POT = "tabletop/lid_off_pot"
 
@@ -107,6 +109,7 @@ def test_a_successful_run_writes_result_picture_and_video(store, tmp_path, capsy
     assert "success" in out and str(tmp_path / "rollout.mp4") in out.replace("\n", "")
     result = json.loads((tmp_path / "result.json").read_text())
     assert result["success"] and result["seed"] == 1 and len(result["steps"]) == 3
+    assert (result["demo"], result["demo_episode"], result["weights"]) == (str(store), 0, None)
     assert max(step["position_error"] for step in result["steps"]) < 0.01
     assert (tmp_path / "steps.png").stat().st_size > 10_000
     assert (tmp_path / "rollout.mp4").stat().st_size > 10_000
@@ -133,6 +136,18 @@ def test_predict_of_the_demonstration_itself_is_exact_for_replay(store, tmp_path
     assert imop("predict", "--demo", store, "--query", store, "--method", "replay", "--out", tmp_path) == 0
     steps = json.loads((tmp_path / "result.json").read_text())["steps"]
     assert np.allclose([step["position_error"] for step in steps], 0)
+    case = from_result(tmp_path / "result.json")
+    assert case.method == "replay" and len(case.demonstration) == len(steps)
+
+
+def test_view_asks_in_the_terminal_and_moves_nothing_before_a_yes(store, monkeypatch, capsys):
+    answers = iter(["n", "y", "q"])
+    monkeypatch.setattr("imop.terminal.console.input", lambda question: next(answers))
+    assert imop("view", "--demo", store, "--scene", store, "--method", "replay", "--confirm") == 1
+    out = capsys.readouterr().out
+    assert "all were rejected" in out and next(answers, None) is None
+    for wrong in ((), ("--scene", store), ("--scene", store, "--task", POT)):
+        assert imop("view", *wrong) == 2
 
 
 def test_predict_takes_recordings_whose_table_is_at_height_0(store, tmp_path, capsys):

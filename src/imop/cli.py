@@ -14,6 +14,7 @@ from rich.text import Text
 from tyro.conf import Positional
 
 from imop import cli_data
+from imop.calibration.command import calibrate
 from imop.errors import ImopError, InvalidInput, MissingExtra
 from imop.files import writable_folder
 from imop.reproduce.command import reproduce
@@ -22,6 +23,7 @@ from imop.terminal import console, list_folder, status
 from imop.training.ablation import Ablation
 from imop.training.config import TrainConfig
 from imop.training.recipe import RecipeName, make, refuse_others
+from imop.viewing.command import view
 
 # Verbs import what they need when they run, so that --help does not wait for torch and MuJoCo.
 
@@ -85,7 +87,12 @@ def run(
     with status(f"recording one demonstration of {task}" if demo is None else f"reading {demo}"):
         watched = demonstration_for(trial) if demo is None else load_demonstration(demo, demo_episode)
     with status(f"performing {task} in scene {seed}"):
-        result = perform(trial, watched, method, out, min_confidence, video, weights)
+        origin = {
+            "demo": demo and f"{demo}",
+            "demo_episode": demo_episode,
+            "weights": weights and f"{weights}",
+        }
+        result = perform(trial, watched, method, out, min_confidence, video, weights, origin)
     console.print(steps_table(result))
     scene = f"scene {seed}" + (f", instance {instance} after {shown}" if trial.other_things else "")
     scene += f", changed: {factors}" if factors else ""
@@ -227,6 +234,7 @@ def evaluate(
 
 app.command(reproduce)
 app.command(setup)
+app.command(calibrate)
 app.command(name="import")(cli_data.import_)
 app.command(cli_data.export)
 app.command(cli_data.check)
@@ -273,7 +281,10 @@ def predict(
     shown, recorded = load_demonstration(demo, demo_episode), load_demonstration(query, query_episode)
     shown, recorded = moved(shown, T_imop_world), moved(recorded, T_imop_world)
     with status(f"predicting {query}"):
-        predictions = predict_recorded(shown, recorded, method, out, weights, T_imop_world, robot)
+        origin = {"demo": f"{demo}", "demo_episode": demo_episode, "query": f"{query}"}
+        origin |= {"query_episode": query_episode, "base": base, "robot": robot}
+        origin["weights"] = weights and f"{weights}"
+        predictions = predict_recorded(shown, recorded, method, out, weights, T_imop_world, robot, origin)
         try:
             draw_predictions(shown, recorded, predictions, out / "steps.png", robot)
         except MissingExtra as error:
@@ -327,6 +338,7 @@ def check_task(task: Positional[str]) -> int:
 
 
 app.command(cli_data.assets)
+app.command(view)
 
 
 @app.command

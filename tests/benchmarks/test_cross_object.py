@@ -67,7 +67,7 @@ def test_a_run_that_was_stopped_goes_on_and_other_code_begins_anew(tmp_path, mon
         return Episode(trial, method, state, True, "success")
 
     monkeypatch.setattr(benchmark, "attempt", attempt)
-    monkeypatch.setattr(benchmark, "demonstrations_for", lambda trial: [None])
+    monkeypatch.setattr(benchmark, "demonstrations_for", lambda *_: [None])
     with pytest.raises(KeyboardInterrupt):
         measure(options(tmp_path), QUIET)
     kept = [(e.trial, e.state) for e in read_episodes(tmp_path / "episodes.jsonl")]

@@ -80,3 +80,18 @@ def test_what_one_policy_does_does_not_depend_on_its_episodes_before():
     benchmark._watched.cache_clear()
     assert benchmark.attempt(trials[1], shown, "learned", "state") == kept[1]
     assert benchmark._watched.cache_info().misses == 1
+
+
+def test_scenes_of_the_same_demonstration_are_tried_together_and_none_is_lost():
+    """One demonstration for all variations of a pot, one for each of the drawers; more than fit at once."""
+    pots, drawers = (
+        suite_trials("tabletop", "all", (name,), 30, 0, 0)[name] for name in ("lid_off_pot", "open_drawer")
+    )
+    wanted = [(trial, method, "", None) for trial in (*pots, *drawers) for method in ("b", "a")]
+    together = benchmark._together(wanted)
+    assert sorted(map(str, wanted)) == sorted(str(one) for group in together for one in group)
+    for group in together:
+        assert len({benchmark.shown_together(one[0]) for one in group}) == 1
+        assert len(group) <= benchmark._AT_ONCE
+        # Who has watched goes on: methods do not alternate.
+        assert [one[1] for one in group] == sorted(one[1] for one in group)

@@ -1,5 +1,8 @@
+from dataclasses import replace
+
 import pytest
 
+from imop.demos.episode import digest_of
 from imop.errors import InvalidInput
 from imop.evaluation.benchmark import shown_together
 from imop.evaluation.methods import make_policy
@@ -116,3 +119,17 @@ def test_further_demonstrations_show_instances_that_are_never_tried():
     assert shown_together(trial) != shown_together(Trial("tabletop/lid_off_pot", 3, 0, 9, shown=0))
     with pytest.raises(InvalidInput, match="demonstrations"):
         Trial("tabletop/lid_off_pot", 3, demonstrations=0)
+
+
+def test_a_demonstration_that_is_kept_is_recorded_once_and_read_back_as_it_was(tmp_path, monkeypatch):
+    trial = Trial("tabletop/lid_off_pot", 3)
+    first = demonstration_for(trial, tmp_path)
+
+    def never(*_):
+        raise AssertionError("recorded again")
+
+    monkeypatch.setattr("imop.evaluation.trials.record_demonstration", never)
+    assert digest_of(demonstration_for(replace(trial, seed=4), tmp_path)) == digest_of(first)
+    for other in (replace(trial, instance=2), trial):
+        with pytest.raises(AssertionError, match="recorded"):
+            demonstration_for(other, None if other is trial else tmp_path)

@@ -72,6 +72,44 @@ def test_cameras_with_wrong_poses_are_corrected_alike_in_demonstration_and_test(
     assert se3.translation_distance(action.T_world_gripper, expert) < 0.01
 
 
+def test_a_decision_may_be_asked_for_again_and_counts_when_it_is_taken(policy, wanted):
+    first, second = (keyframe.observation for keyframe in wanted.keyframes[:2])
+    decision = policy.decide(first)
+    assert same(decision.action, policy.decide(first).action) and decision.option.step == 0
+    policy.take(decision)
+    assert policy.decide(second).option.step == 1
+    policy.reset()
+    assert same(policy.act(first), decision.action)
+
+
+def test_another_candidate_can_be_taken_instead_and_the_episode_goes_on_from_it(policy, shown, wanted):
+    decision = policy.decide(wanted.keyframes[0].observation)
+    probabilities = [candidate.probability for candidate in decision.candidates]
+    assert len(probabilities) > 1 and probabilities[0] == decision.action.confidence
+    other = policy.instead(decision, 1)
+    T = decision.candidates[1].T_query_support
+    assert other.action.confidence == probabilities[1]
+    assert se3.near(
+        other.action.T_world_gripper, T @ shown.keyframes[0].action.T_world_gripper, CLEARANCE, 1e-6
+    )
+    for number in (-1, len(probabilities)):
+        with pytest.raises(InvalidInput, match="number"):
+            policy.instead(decision, number)
+    policy.take(other)
+    following = policy.decide(wanted.keyframes[1].observation)
+    assert following.option.step == 1
+    policy.take(following)
+
+
+def test_what_was_shown_can_be_looked_at(policy, shown):
+    step, prepared = policy.steps()[1]
+    assert len(policy.steps()) == len(shown)
+    assert np.array_equal(step.action.T_world_gripper, shown.keyframes[1].action.T_world_gripper)
+    assert nearest(prepared.region, step.before.fused.points)[0].max() < 1e-9
+    with pytest.raises(InvalidInput, match="demonstration"):
+        policy.steps(1)
+
+
 def test_matched_points_lie_in_the_scene_and_move_rigidly(policy, shown, wanted):
     action = policy.act(wanted.keyframes[0].observation)
     T = action.T_world_gripper @ se3.invert(shown.keyframes[0].action.T_world_gripper)

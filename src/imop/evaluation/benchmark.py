@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from pathlib import Path
+from typing import Any
 
 from joblib import delayed
 from rich.console import Console
@@ -140,6 +141,12 @@ def disturbance_notes(
     return notes + [f"It cannot happen in {', '.join(without)}."] * bool(without)
 
 
+_Wanted = tuple[Trial, str, str, Path | None]
+"""A scene, a method, its state, and the folder of its weights."""
+_AT_ONCE = 25
+"""Episodes that are tried and logged together, at most."""
+
+
 @dataclass(frozen=True)
 class Shown:
     """What a policy is shown.
@@ -162,11 +169,13 @@ def tried(
     weights: Path | None = None,
     focus: bool = False,
     baselines: Path | None = None,
+    kept: Path | None = None,
 ) -> dict[tuple[Trial, str], Episode]:
     """The episode of every method in every scene: from the log, or tried now and added to it.
 
     What the log has of other code or weights is tried again. If `focus`, somebody points at the thing that is
-    acted on first, in demonstration and scene. For the other arguments see `evaluate_suite`.
+    acted on first, in demonstration and scene. Demonstrations are kept for the next time in the folder
+    `kept`, if there is one, see `demonstration_for`. For the other arguments see `evaluate_suite`.
 
     Raises:
         InvalidInput: for an unknown task or method, or one that nobody can point out things to.
@@ -185,18 +194,29 @@ def tried(
         lambda task, method: method_state(method, folders[method], task) + ("-focus" if focus else "")
     )
     wanted = [(trial, method, state(trial.task, method)) for trial in trials for method in methods]
-    missing = [one for one in wanted if known.find(*one) is None]
-    shown = _demonstrations([trial for trial, _, _ in missing], jobs, console)
-    # Who has watched a demonstration acts in all of its scenes before another one is watched.
-    missing.sort(key=lambda one: (shown_together(one[0]), one[1]))
-    work = [
-        delayed(attempt)(one[0], shown[shown_together(one[0])], *one[1:], folders[one[1]], focus)
-        for one in missing
-    ]
-    for episode in parallel(work, jobs, console, "episodes"):
-        known.add(episode)
+    missing = [(*one, folders[one[1]]) for one in wanted if known.find(*one) is None]
+    work = [delayed(_attempts)(these, focus, kept) for these in _together(missing)]
+    for tried_together in parallel(work, jobs, console, "episodes, some at a time"):
+        for episode in tried_together:
+            known.add(episode)
     episodes = (known.find(*one) for one in wanted)
     return {(episode.trial, episode.method): episode for episode in episodes if episode is not None}
+
+
+def _together(missing: Sequence[_Wanted]) -> list[list[_Wanted]]:
+    """What one process tries, one after another: who watched a demonstration acts in many of its scenes."""
+    groups: dict[tuple[Any, ...], list[_Wanted]] = {}
+    for one in missing:
+        groups.setdefault(shown_together(one[0]), []).append(one)
+    sorted_groups = [sorted(group, key=lambda one: one[1]) for group in groups.values()]
+    return [group[i : i + _AT_ONCE] for group in sorted_groups for i in range(0, len(group), _AT_ONCE)]
+
+
+def _attempts(wanted: Sequence[_Wanted], focus: bool, kept: Path | None) -> list[Episode]:
+    """What happens in scenes that share their demonstrations."""
+    trial = wanted[0][0]
+    shown = Shown(shown_together(trial), tuple(demonstrations_for(trial, kept)))
+    return [attempt(trial, shown, method, state, weights, focus) for trial, method, state, weights in wanted]
 
 
 def attempt(
@@ -264,12 +284,3 @@ def shown_together(trial: Trial) -> tuple[str, int, int, str, int, str]:
     """What trials with the same demonstrations have in common."""
     shown = trial.demonstrated
     return shown.task, shown.variation, shown.instance, shown.change, shown.demonstrations, shown.robot
-
-
-def _demonstrations(
-    trials: list[Trial], jobs: int, console: Console
-) -> dict[tuple[str, int, int, str, int, str], Shown]:
-    wanted = {shown_together(trial): trial for trial in trials}
-    work = [delayed(demonstrations_for)(trial) for trial in wanted.values()]
-    recorded = parallel(work, jobs, console, "demonstrations")
-    return {key: Shown(key, tuple(these)) for key, these in zip(wanted, recorded, strict=True)}

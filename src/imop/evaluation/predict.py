@@ -1,6 +1,7 @@
 """A recorded episode, predicted keyframe by keyframe after one demonstration; nothing moves."""
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -72,6 +73,7 @@ def predict_recorded(
     weights: Path | None = None,
     T_imop_world: FloatArray | None = None,
     robot: str = PANDA,
+    origin: Mapping[str, object] | None = None,
 ) -> list[Prediction]:
     """Predict every keyframe of `recorded` and write result.json into `out`.
 
@@ -84,6 +86,7 @@ def predict_recorded(
         T_imop_world: (4, 4) by which both were moved before (see `frame_of`); poses are written as they were
             recorded.
         robot: its name, see `perception_for`.
+        origin: where all of it was read, to be written into result.json too.
 
     Raises:
         ImopError: if either recording cannot be used.
@@ -105,7 +108,7 @@ def predict_recorded(
         }
         for p in predictions
     ]
-    save_json({"method": method, "steps": steps}, out / "result.json")
+    save_json({"method": method, **(origin or {}), "steps": steps}, out / "result.json")
     return predictions
 
 

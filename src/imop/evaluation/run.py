@@ -1,5 +1,6 @@
 """One task, one demonstration, one new scene: perform it and show what happened."""
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 
@@ -48,10 +49,12 @@ def perform(
     min_confidence: float = 0.0,
     video: bool = True,
     weights: Path | None = None,
+    origin: Mapping[str, object] | None = None,
 ) -> Rollout:
     """Let a method that was shown `demonstration` act in the trial's scene.
 
-    Writes result.json, steps.png and, if wanted, rollout.mp4 into `out`.
+    Writes result.json, steps.png and, if wanted, rollout.mp4 into `out`. What `origin` says goes into
+    result.json too: where the demonstration and the weights were read.
 
     Raises:
         ImopError: if the demonstration or the scene cannot be used.
@@ -74,7 +77,8 @@ def perform(
         panels.append(Panel(demonstration.keyframes[step], observation, action, f"step {step}"))
 
     result = rollout(env, policy, most_actions(method, demonstration, trial, env.task), expert, on_action)
-    save_json({**asdict(trial), "method": method, **result.as_dict()}, out / "result.json")
+    told = {**asdict(trial), "method": method, **(origin or {}), **result.as_dict()}
+    save_json(told, out / "result.json")
     if panels:
         save_picture(panels, out / "steps.png")
     if film.frames:

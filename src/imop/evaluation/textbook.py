@@ -106,6 +106,11 @@ class TextbookStep:
         """(M, 3) points of the region in the demonstrated scene."""
         return self._region.cloud.points
 
+    @property
+    def spread(self) -> None:
+        """Nothing is known of it."""
+        return None
+
     def locate(
         self, query: Scene, progress: Progress = BEGINNING, feasible: Feasible | None = None
     ) -> tuple[Candidate, ...]:

@@ -3,9 +3,16 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 
+from joblib import Memory
+
+import imop.robots
+import imop.sim
+import imop.tasks
 from imop.baselines.policy import REGRESSORS
 from imop.errors import ImopError, InvalidInput
+from imop.evaluation.fingerprint import code_digest, own_code_digest
 from imop.evaluation.splits import chosen_tasks
 from imop.sim.arms import PANDA, find_arm
 from imop.sim.sensing import Sensing
@@ -112,19 +119,24 @@ class Trial:
         return env
 
 
-def demonstration_for(trial: Trial) -> Demonstration:
+def demonstration_for(trial: Trial, kept: Path | None = None) -> Demonstration:
     """One demonstration of the trial's task, shown variation and instance, in a scene that is never tested.
 
     The trial's change of the scene does not apply to it, but that of the set-up does.
+
+    Args:
+        trial: the scene in which the task is to be done.
+        kept: folder in which recorded demonstrations are kept for the next time, by joblib: a folder of
+            one's own, for what lies in it is unpickled.
 
     Raises:
         ExpertFailed: if the expert succeeds in none of the scenes it may choose from.
         NoRoom: if not even a scene was found.
     """
-    return _demonstration(trial, DEMONSTRATION_SEED, trial.demonstrated.instance)
+    return _demonstration(trial, DEMONSTRATION_SEED, trial.demonstrated.instance, kept)
 
 
-def demonstrations_for(trial: Trial) -> list[Demonstration]:
+def demonstrations_for(trial: Trial, kept: Path | None = None) -> list[Demonstration]:
     """All that is shown before the trial: that of `demonstration_for`, then those of other instances.
 
     Raises:
@@ -133,20 +145,33 @@ def demonstrations_for(trial: Trial) -> list[Demonstration]:
     further = range(1, trial.demonstrations)
     first = trial.demonstrated.instance
     # Scenes and instances that no trial has: their seeds are below that of demonstrations.
-    return [demonstration_for(trial)] + [
-        _demonstration(trial, DEMONSTRATION_SEED + k * _RECORDING_ATTEMPTS, first + _OTHERS + k)
+    return [demonstration_for(trial, kept)] + [
+        _demonstration(trial, DEMONSTRATION_SEED + k * _RECORDING_ATTEMPTS, first + _OTHERS + k, kept)
         for k in further
     ]
 
 
-def _demonstration(trial: Trial, first_seed: int, instance: int) -> Demonstration:
-    task = make_task(trial.task)
+def _demonstration(trial: Trial, first_seed: int, instance: int, kept: Path | None) -> Demonstration:
+    code = [code_digest(imop.sim, imop.robots, imop.tasks), *own_code_digest(find_task(trial.task))]
+    recorded = Memory(kept, verbose=0, compress=1).cache(_recorded)
+    variation = trial.demonstrated.variation
+    asked = code, trial.task, variation, instance, first_seed, trial.robot
+    return _seen(recorded(*asked), trial.changed.shown)
+
+
+def _recorded(
+    code: list[str],
+    name: str,
+    variation: int,
+    instance: int,
+    first_seed: int,
+    robot: str,
+) -> Demonstration:
+    """The first demonstration that succeeds; what is kept is that of the same `code`."""
+    task = make_task(name)
     for seed in range(first_seed, first_seed + _RECORDING_ATTEMPTS):
         try:
-            recorded = record_demonstration(
-                task, seed, trial.demonstrated.variation, instance, arm=find_arm(trial.robot)
-            )
-            return _seen(recorded, trial.changed.shown)
+            return record_demonstration(task, seed, variation, instance, arm=find_arm(robot))
         except (ExpertFailed, NoRoom) as error:
             failure: ImopError = error
     raise failure

@@ -108,6 +108,23 @@ class SelfFilter:
                 robot[near] = solid.distance(p_solid, solid.size) <= solid.margin
         return robot
 
+    def distances(
+        self, points: FloatArray, joint_positions: FloatArray, gripper_opening: float = 1.0
+    ) -> FloatArray:
+        """(N,) metres of points (N, 3), world frame, to the robot's surface; negative inside, margins aside.
+
+        Raises:
+            InvalidInput: as `is_robot`.
+        """
+        points = as_array("points", points, (None, 3))
+        nearest = np.full(len(points), np.inf)
+        for solid, T in zip(self._solids, self._posed(joint_positions, gripper_opening), strict=True):
+            # A shape is at least this far away.
+            near = np.flatnonzero(se3.lengths(points - T[:3, 3]) - solid.radius < nearest)
+            p_solid = (points[near] - T[:3, 3]) @ T[:3, :3]
+            nearest[near] = np.minimum(nearest[near], solid.distance(p_solid, solid.size))
+        return nearest
+
     def _posed(self, joint_positions: FloatArray, gripper_opening: float) -> FloatArray:
         q = as_array("joint_positions", joint_positions, (self._joints,))
         if not np.all(np.isfinite(q)):

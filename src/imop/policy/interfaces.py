@@ -211,6 +211,14 @@ class PreparedStep(Protocol):
         """(M, 3) points of the invariant region in the demonstrated scene; may be empty."""
         ...
 
+    @property
+    def spread(self) -> FloatArray | None:
+        """(M,) metres, how far from each point of the region its counterpart on another thing may be.
+
+        Both are seen from the action, so a small spread means what is invariant. None if nothing is known.
+        """
+        ...
+
     def locate(
         self, query: Scene, progress: Progress = BEGINNING, feasible: Feasible | None = None
     ) -> tuple[Candidate, ...]:

@@ -103,6 +103,12 @@ class LearnedStep:
         """(M, 3) points of the region in the demonstrated scene, with what is mostly in it completed."""
         return self._shown.completed
 
+    @property
+    def spread(self) -> FloatArray:
+        """(M,) metres, of the points of the region; see `PreparedStep.spread`."""
+        region = self._shown.region
+        return np.asarray(region.spreads[nearest(self.region, region.cloud.points)[1][:, 0]])
+
     def locate(
         self, query: Scene, progress: Progress = BEGINNING, feasible: Feasible | None = None
     ) -> tuple[Candidate, ...]:

@@ -1,7 +1,7 @@
 """The policy: watch a demonstration once, then act in scenes that were never seen."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from imop.geometry.view_alignment import corrected, find_errors
 from imop.networks.model import BUNDLED, load_model
 from imop.policy.interfaces import (
     BEGINNING,
+    Candidate,
     Feasible,
     Matcher,
     PreparedStep,
@@ -30,6 +31,23 @@ from imop.types import Action, Demonstration, FloatArray, Match, Observation
 # The tip is kept this far above the ground, metres, if it was shown above it. What would be deeper in the
 # ground than the error of a pose is another motion, and left as it is. Chosen on ring_on_peg, seeds 10 to 19.
 CLEARANCE, MISJUDGED = 0.003, 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """What a policy would do, and what else it might; nothing is done yet.
+
+    Attributes:
+        option: the demonstrated step that is transferred.
+        query: the observed scene.
+        candidates: where the step's region may be in it, likeliest first.
+        action: of one of them, at first of the likeliest.
+    """
+
+    option: Option
+    query: Scene
+    candidates: tuple[Candidate, ...]
+    action: Action
 
 
 class OneShotPolicy:
@@ -159,6 +177,16 @@ class OneShotPolicy:
                 measured, or the focus does not fit the observation.
             NoConfidentMatch: if the confidence is below `min_confidence`.
         """
+        decision = self.decide(observation, focus)
+        self.take(decision)
+        return decision.action
+
+    def decide(self, observation: Observation, focus: Focus | None = None) -> Decision:
+        """What `act` would do now, and what else might be meant; it may be asked again before it is taken.
+
+        Raises:
+            InvalidInput, NoConfidentMatch: as `act`.
+        """
         if not self._demonstrations:
             raise InvalidInput("demonstration", "none was watched", "call watch(demonstration) before act")
         if missing := sorted(self._cameras - set(observation.views)):
@@ -169,65 +197,78 @@ class OneShotPolicy:
         if self.recovers and not self._attempts.arrived(observation):
             self.router.undo()
             self._progress = self._before
-        option, action = self._likeliest(query, self.router.options(query))
-        if self.recovers:
-            option, action = self._checked(query, option, action)
+        decision = self._likeliest(query, self.router.options(query))
+        return self._checked(decision) if self.recovers else decision
+
+    def instead(self, decision: Decision, number: int) -> Decision:
+        """The same decision for the candidate of that number.
+
+        Raises:
+            InvalidInput: if there is none of that number.
+        """
+        if not 0 <= number < len(decision.candidates):
+            raise InvalidInput("number", f"{number}", f"0 .. {len(decision.candidates) - 1}")
+        candidate, option = decision.candidates[number], decision.option
+        return replace(decision, action=self._action(decision.query, option, candidate))
+
+    def take(self, decision: Decision) -> None:
+        """Its action is being performed: the episode goes on from there."""
+        option, action = decision.option, decision.action
         self.router.took(option.demonstration, option.step)
         self._attempts.took(option, action.T_world_gripper)
-        assert action.match is not None
+        assert action.match is not None and action.match.T_query_support is not None
         self._before = self._progress
         self._progress = {option.demonstration: Progress(action.match.T_query_support)}
-        self._last = query
-        return action
+        self._last = decision.query
 
-    def _likeliest(self, query: Scene, options: Sequence[Option]) -> tuple[Option, Action]:
-        """The step that is most plausible and most likely found, and its action.
+    def _likeliest(self, query: Scene, options: Sequence[Option]) -> Decision:
+        """The step that is most plausible and most likely found.
 
         Raises:
             NoConfidentMatch: if none is found with enough confidence.
         """
-        found, failure = [], NoConfidentMatch(0.0, self._min_confidence)
+        found: list[tuple[float, Decision]] = []
+        failure = NoConfidentMatch(0.0, self._min_confidence)
         for option in options:
             # What was done before was another motion in the scene of another demonstration.
             progress = self._progress.get(option.demonstration, BEGINNING)
             tried = self._attempts.go_on(option)
             try:
-                progress = replace(progress, tried=tried)
-                action = self.locate(query, option.step, option.demonstration, progress)
+                decision = self._decision(query, option, replace(progress, tried=tried))
             except NoConfidentMatch as error:
                 failure = error
                 continue
             # A demonstration that is followed alone need not be weighed.
-            chance = self._weakest(query, option, action) if len(options) > 1 else 1.0
-            found.append((option.weight * chance, option, action))
+            chance = self._weakest(decision) if len(options) > 1 else 1.0
+            found.append((option.weight * chance, decision))
         if not found:
             raise failure
-        _, option, action = max(found, key=lambda one: one[0])
-        return option, action
+        return max(found, key=lambda one: one[0])[1]
 
-    def _weakest(self, query: Scene, option: Option, action: Action) -> float:
+    def _weakest(self, decision: Decision) -> float:
         """The probability of the least probable of all places that a demonstration has yet to come to."""
-        number = option.demonstration
+        number = decision.option.demonstration
         places = enumerate(same_place(self._prepared[number]))
-        later = [k for k, same in places if k > option.step and not same]
-        chances = [action.confidence]
+        later = [k for k, same in places if k > decision.option.step and not same]
+        chances = [decision.action.confidence]
         for step in later:
-            candidates = self._prepared[number][step].locate(query, BEGINNING, self._feasible)
+            candidates = self._prepared[number][step].locate(decision.query, BEGINNING, self._feasible)
             chances.append(candidates[0].probability if candidates else 0.0)
         return min(chances)
 
-    def _checked(self, query: Scene, option: Option, action: Action) -> tuple[Option, Action]:
-        """The same, or the step before and its action, if what it acted on is not where it was."""
+    def _checked(self, decision: Decision) -> Decision:
+        """The same, or one for the step before, if what that acted on is not where it was."""
+        option = decision.option
         number, step = option.demonstration, option.step
         last, steps = self._progress.get(number, BEGINNING).T_last, self._demonstrations[number]
         same = step > 0 and same_place(self._prepared[number][step - 1 : step + 1])[1]
         if last is None or not same or holds(steps)[step - 1]:
-            return option, action
-        T_shown = steps[step].action.T_world_gripper
-        if not self._attempts.undone(option, action.T_world_gripper, last @ T_shown):
-            return option, action
+            return decision
+        T_held = last @ steps[step].action.T_world_gripper
+        if not self._attempts.undone(option, decision.action.T_world_gripper, T_held):
+            return decision
         # Where it is now, nothing that was done before tells.
-        return replace(option, step=step - 1), self.locate(query, step - 1, number)
+        return self._decision(decision.query, replace(option, step=step - 1), BEGINNING)
 
     def see(
         self, observation: Observation, focus: Focus | None = None, earlier: Scene | None = None
@@ -271,24 +312,54 @@ class OneShotPolicy:
         Raises:
             NoConfidentMatch: if the confidence is below `min_confidence`, or nothing was found.
         """
-        shown = self._demonstrations[demonstration][step]
-        demonstrated = shown.action
-        prepared = self._prepared[demonstration][step]
+        return self._decision(query, Option(demonstration, step), progress).action
+
+    def steps(self, demonstration: int = 0) -> tuple[tuple[Transition, PreparedStep], ...]:
+        """The steps of a demonstration as they are worked with, and what was found of each, to look at.
+
+        Raises:
+            InvalidInput: if no demonstration of that number was watched.
+        """
+        if not 0 <= demonstration < len(self._demonstrations):
+            watched = f"a number below {len(self._demonstrations)}, for so many were watched"
+            raise InvalidInput("demonstration", f"{demonstration}", watched)
+        return tuple(zip(self._demonstrations[demonstration], self._prepared[demonstration], strict=True))
+
+    def _decision(self, query: Scene, option: Option, progress: Progress) -> Decision:
+        """For a step, by its likeliest candidate.
+
+        Raises:
+            NoConfidentMatch: if the confidence is below `min_confidence`, or nothing was found.
+        """
+        prepared = self._prepared[option.demonstration][option.step]
         candidates = prepared.locate(query, progress, self._feasible)
-        best = candidates[0] if candidates else None
-        if best is None or best.probability < self._min_confidence:
-            raise NoConfidentMatch(best.probability if best else 0.0, self._min_confidence)
-        T = se3.orthonormal(best.T_query_support)
+        if not candidates or candidates[0].probability < self._min_confidence:
+            probability = candidates[0].probability if candidates else 0.0
+            raise NoConfidentMatch(probability, self._min_confidence)
+        return Decision(option, query, candidates, self._action(query, option, candidates[0]))
+
+    def _action(self, query: Scene, option: Option, candidate: Candidate) -> Action:
+        """The demonstrated action, carried over by a candidate."""
+        shown = self._demonstrations[option.demonstration][option.step]
+        demonstrated = shown.action
+        region = self._prepared[option.demonstration][option.step].region
+        T = se3.orthonormal(candidate.T_query_support)
         match = Match(
-            step, best.p_support, best.p_query, prepared.region, T, best.generator, best.probability
+            option.step,
+            candidate.p_support,
+            candidate.p_query,
+            region,
+            T,
+            candidate.generator,
+            candidate.probability,
         )
         return Action(
             above_ground(se3.orthonormal(T @ demonstrated.T_world_gripper), query, shown),
             demonstrated.gripper_open,
             demonstrated.allow_collisions,
-            best.probability,
+            candidate.probability,
             match,
-            best.reachable,
+            candidate.reachable,
         )
 
 

@@ -112,6 +112,11 @@ class PaperStep:
         """(M, 3) points of the region in the demonstrated scene that are matched."""
         return self._region
 
+    @property
+    def spread(self) -> None:
+        """Nothing is known of it."""
+        return None
+
     def locate(
         self, query: Scene, progress: Progress = BEGINNING, feasible: Feasible | None = None
     ) -> tuple[Candidate, ...]:

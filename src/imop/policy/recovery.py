@@ -25,9 +25,10 @@ from imop.types import FloatArray, Observation
 
 # An arm that is farther than this from where it was sent, metres and radians, was not moved there.
 ARRIVED = (0.02, np.radians(10.0))
-# Regions that have more than this share in common are the same.
+# Regions that have more than this share in common are the same; not tuned.
 SAME_PLACE = 0.5
-# How often what is right fails all the same: the thing slips, or somebody moves it.
+# How often what is right fails all the same: the thing slips, or somebody moves it. A guess, about
+# as often as the oracle fails; not tuned.
 BAD_LUCK = 0.1
 
 
@@ -54,6 +55,9 @@ class Attempts:
 
     def took(self, option: Option, T_world_gripper: FloatArray) -> None:
         """The arm is sent to a pose (4, 4), for a step."""
+        if self._taken and self._taken[-1][:2] == (option.demonstration, option.step):
+            # What begins again is forgotten before (`go_on`), so `undone` led here.
+            self._redone.add((option.demonstration, option.step))
         self._sent = option.demonstration, option.step, T_world_gripper
         self._taken.append(self._sent)
 
@@ -68,7 +72,7 @@ class Attempts:
         return False
 
     def undone(self, option: Option, T_found: FloatArray, T_held: FloatArray) -> bool:
-        """Whether the step before, which was done last, has to be done again; said once of each.
+        """Whether the step before, which was done last, has to be done again, but each only once.
 
         Args:
             option: the step that was to come now, fixed to the same place as the one before.
@@ -78,10 +82,7 @@ class Attempts:
         before = option.demonstration, option.step - 1
         if not self._taken or self._taken[-1][:2] != before or before in self._redone:
             return False
-        if se3.translation_distance(T_found, T_held) < ARRIVED[0]:
-            return False
-        self._redone.add(before)
-        return True
+        return bool(se3.translation_distance(T_found, T_held) >= ARRIVED[0])
 
     def go_on(self, option: Option) -> tuple[Tried, ...]:
         """What was tried in vain for a step that may be done now.

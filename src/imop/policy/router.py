@@ -31,9 +31,11 @@ from imop.policy.interfaces import Scene, Transition
 from imop.types import BoolArray, FloatArray
 
 # Fingers that are open by less than this share of their stroke hold nothing; by more, they do if they close.
+# The first is what a closed gripper's opening may err by, the second twice that; neither was tuned.
 EMPTY, HELD = 0.01, 0.02
 
 # Of several demonstrations those are options that are at least so plausible, against the most plausible one.
+# Not tuned: it saves searches where one is clearly followed.
 PLAUSIBLE = 0.1
 
 

@@ -25,6 +25,7 @@ from imop.types import BoolArray, FloatArray
 # Candidates that take the gripper farther apart than this, metres and radians, are rivals.
 ELSEWHERE = (0.02, 0.26)
 # Who takes the gripper nearer than this to where it was in vain, metres and radians, tries the same again.
+# Not tuned: what a grasp of something of a few centimetres forgives.
 SAME_TRY = (0.02, np.radians(10.0))
 # A point that is explained by more than this has a counterpart.
 FOUND = 0.3

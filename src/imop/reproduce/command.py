@@ -29,8 +29,9 @@ def reproduce(
     """Measure a table of the paper, or one of our own, with the published numbers beside.
 
     Without a table it lists them, with their cost. Rows whose method or weights are not there say so. Every
-    episode is kept in OUT/episodes.jsonl, which all tables share: run again, the same command goes on where
-    it was stopped. Writes table.md, results.json and, with the extra viz, tasks.png into OUT/TABLE.
+    episode is kept in OUT/episodes.jsonl and every demonstration in OUT/demonstrations, which all tables
+    share: run again, the same command goes on where it was stopped. Writes table.md, results.json and, with
+    the extra viz, tasks.png into OUT/TABLE.
 
     Args:
         table: base, novel, parameters, cross-object, ablations, real-robot, disturbed, demonstrations, long.

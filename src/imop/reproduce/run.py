@@ -19,7 +19,7 @@ from imop.reproduce.measured import NOT_YET, Measured, MeasuredRow, MeasuredSect
 from imop.reproduce.origin import code, commit, machine, parameters, weight_files
 from imop.reproduce.table import Row, Section, Table
 
-LOG = "episodes.jsonl"
+LOG, KEPT = "episodes.jsonl", "demonstrations"
 _QUICK_SCENES = 3
 _QUICK_EPISODES = 200
 """As many as two cores try in less than 20 minutes, with their demonstrations."""
@@ -30,7 +30,8 @@ class Options:
     """How a table is measured.
 
     Attributes:
-        out: folder of all tables: the log of episodes, which they share, and a folder for each.
+        out: folder of all tables: the log of episodes and the demonstrations, which they share, and a folder
+            for each.
         quick: the first scenes of some of the tasks, for some of the rows.
         episodes: scenes of a task; None for the table's number.
         seed: of the first scene.
@@ -182,7 +183,8 @@ def _tried(
     everything = [trial for of_task in scenes.values() for trial in of_task]
     methods, log = [row.method for row in rows], options.out / LOG
     weights = rows[0].weights
-    found = tried(everything, methods, options.jobs, console, log, weights, focus, baselines=weights)
+    kept = options.out / KEPT
+    found = tried(everything, methods, options.jobs, console, log, weights, focus, weights, kept)
     return {
         row.label: {
             task: [_outcome(found[trial, row.method]) for trial in of_task]

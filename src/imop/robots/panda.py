@@ -73,13 +73,16 @@ def link_poses(q: FloatArray) -> FloatArray:
         InvalidInput: if `q` does not have seven entries.
     """
     q = as_array("q", q, (7,))
-    T, poses = T_WORLD_BASE, []
-    for T_fixed, c, s in zip(T_LINK_JOINT, np.cos(q), np.sin(q), strict=True):
-        T = T @ T_fixed
-        T[:3, :2] = T[:3, :2] @ ((c, -s), (s, c))
-        poses.append(T)
-    poses.append(T @ T_LINK7_FLANGE)
-    return np.stack(poses)
+    c, s = np.cos(q)[:, None], np.sin(q)[:, None]
+    x, y = T_LINK_JOINT[:, :3, 0], T_LINK_JOINT[:, :3, 1]
+    turned = T_LINK_JOINT.copy()
+    turned[:, :3, 0], turned[:, :3, 1] = c * x + s * y, c * y - s * x
+    poses = np.empty((8, 4, 4))
+    T = T_WORLD_BASE
+    for i, T_link in enumerate(turned):
+        poses[i] = T = T @ T_link
+    poses[7] = T @ T_LINK7_FLANGE
+    return poses
 
 
 def tip_pose(q: FloatArray) -> FloatArray:

@@ -51,9 +51,10 @@ class DepthNoise:
         views = dict(observation.views)
         if len(views) > 2 and rng.random() < self.lose_view:
             del views[str(rng.choice(sorted(views)))]
-        return replace(observation, views={name: self._worse(v, rng) for name, v in views.items()})
+        return replace(observation, views={name: self.view(v, rng) for name, v in views.items()})
 
-    def _worse(self, view: CameraView, rng: np.random.Generator) -> CameraView:
+    def view(self, view: CameraView, rng: np.random.Generator) -> CameraView:
+        """One view as such a camera would have given it."""
         if not (self.disparity or self.wave or self.bleed or self.holes or self.calibration):
             return view
         depth = view.depth.copy()

@@ -1,6 +1,7 @@
 """Inverse kinematics of the Panda: all solutions for one pose, and the continuous branch along a line."""
 
 import frankik
+import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -11,9 +12,8 @@ from imop.robots.panda import (
     JOINT_UPPER,
     PANDA_HOME_Q,
     T_FLANGE_TIP,
-    T_LINK7_FLANGE,
-    T_LINK_JOINT,
     T_WORLD_BASE,
+    link_poses,
 )
 from imop.types import FloatArray, as_pose
 
@@ -110,11 +110,13 @@ def follow(poses: FloatArray, q_start: FloatArray) -> FloatArray | None:
 
 
 def _newton(q: FloatArray, T: FloatArray) -> FloatArray | None:
+    # MuJoCo's functions: scipy's take longer than all the rest.
+    error, quaternion = np.empty(6), np.empty(4)
     for _ in range(_NEWTON_STEPS):
         T_q, J = tip_and_jacobian(q)
-        error = np.concatenate(
-            [T[:3, 3] - T_q[:3, 3], Rotation.from_matrix(T[:3, :3] @ T_q[:3, :3].T).as_rotvec()]
-        )
+        error[:3] = T[:3, 3] - T_q[:3, 3]
+        mujoco.mju_mat2Quat(quaternion, (T[:3, :3] @ T_q[:3, :3].T).ravel())
+        mujoco.mju_quat2Vel(error[3:], quaternion, 1.0)
         if np.abs(error[:3]).max() < _POSITION_TOLERANCE and np.abs(error[3:]).max() < _ROTATION_TOLERANCE:
             return q
         step: FloatArray = J.T @ np.linalg.solve(J @ J.T + _DAMPING**2 * np.eye(6), error)
@@ -124,13 +126,10 @@ def _newton(q: FloatArray, T: FloatArray) -> FloatArray | None:
 
 def tip_and_jacobian(q: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Tip pose (4, 4) and its Jacobian (6, 7): linear, then angular velocity, world frame."""
-    T, axes, origins = T_WORLD_BASE, [], []
-    for fixed, angle in zip(T_LINK_JOINT, q, strict=True):
-        c, s = np.cos(angle), np.sin(angle)
-        T = T @ fixed
-        T[:3, :2] = np.stack([c * T[:3, 0] + s * T[:3, 1], c * T[:3, 1] - s * T[:3, 0]], axis=1)
-        axes.append(T[:3, 2])
-        origins.append(T[:3, 3])
-    T = T @ T_LINK7_FLANGE @ T_FLANGE_TIP
-    z, arms = np.stack(axes), T[:3, 3] - np.stack(origins)
-    return T, np.concatenate([np.cross(z, arms), z], axis=1).T
+    links = link_poses(q)
+    T = links[-1] @ T_FLANGE_TIP
+    z = links[:7, :3, 2]
+    arm = T[:3, 3] - links[:7, :3, 3]
+    # np.cross takes longer than all the rest.
+    linear = z[:, [1, 2, 0]] * arm[:, [2, 0, 1]] - z[:, [2, 0, 1]] * arm[:, [1, 2, 0]]
+    return T, np.concatenate([linear, z], axis=1).T

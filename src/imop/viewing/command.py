@@ -1,0 +1,108 @@
+"""`imop view`: look at what the policy understood, and let it act, in a browser."""
+
+import threading
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from imop.errors import InvalidInput
+from imop.files import replaced
+from imop.terminal import console, status
+
+if TYPE_CHECKING:
+    from imop.viewing.cases import Case
+
+SIZE = (1600, 760)
+"""Of a picture, pixels."""
+
+
+def view(
+    task: str | None = None,
+    seed: int = 1,
+    variation: int = 0,
+    instance: int = 0,
+    demo: Path | None = None,
+    demo_episode: int = 0,
+    scene: Path | None = None,
+    scene_episode: int = 0,
+    result: Path | None = None,
+    method: str = "learned",
+    weights: Path | None = None,
+    base: tuple[float, float, float] | None = None,
+    robot: str = "panda",
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    ahead: int | None = None,
+    confirm: bool = False,
+    screenshot: Path | None = None,
+) -> int:
+    """Show in a browser what the policy understood: region, matches, candidates, predicted gripper, path.
+
+    Of a recording (--demo and --scene), of a result.json of `imop run` or `imop predict` (--result), or live
+    on the simulator (--task), where a button performs what is shown. Needs the extra view; a task sim, too.
+
+    Args:
+        task: suite and name of a task to perform on the simulator, such as tabletop/lid_off_pot.
+        seed: scene to perform it in.
+        variation: which variation of the task.
+        instance: seed of the objects' shapes, sizes and colours.
+        demo: store or folder of RLBench's layout with the demonstration; with a task, one is recorded if it
+            is not given.
+        demo_episode: which of its episodes.
+        scene: store or folder with a recorded episode to predict.
+        scene_episode: which of its episodes.
+        result: a result.json; its scenes and its demonstration are made or read again, and decided anew.
+        method: as in `imop run`.
+        weights: folder that `imop train` wrote; by default the bundled weights.
+        base: where the robot's base is in the recordings' frame, metres, as in `imop predict`.
+        robot: whose points are left out and which poses are reached, as in `imop predict`.
+        host: address to listen on; by default only this machine can look.
+        port: of the page.
+        ahead: so many decisions are accepted before anything is shown; all of a result if not given, and none
+            of anything else.
+        confirm: ask in the terminal before every motion, without a browser.
+        screenshot: PNG file to write instead of waiting for somebody; needs Chromium.
+    """
+    from imop.viewing.cases import from_result, recorded, simulated
+    from imop.viewing.confirm import attend
+    from imop.viewing.session import Session
+
+    sources = {"task": task, "scene": scene, "result": result}
+    chosen = [name for name, given in sources.items() if given is not None]
+    if len(chosen) != 1:
+        problem = f"{' and '.join(chosen) or 'nothing'} given"
+        raise InvalidInput("view", problem, "one of task, scene and result")
+    case: Case
+    with status("reading, watching and deciding"):
+        if result is not None:
+            case = from_result(result)
+        elif task is not None:
+            from imop.evaluation.trials import Trial
+
+            shown = None if demo is None else (demo, demo_episode)
+            case = simulated(Trial(task, seed, variation, instance), shown, method, weights)
+        elif demo is None or scene is None:
+            raise InvalidInput("demo", "missing", "the demonstration, beside the scene that was recorded")
+        else:
+            case = recorded((demo, demo_episode), (scene, scene_episode), method, weights, base, robot)
+        session = Session(case.decider(), case.world)
+        for _ in range(case.steps if ahead is None and result is not None else ahead or 0):
+            if not session.over:
+                session.accept()
+    if confirm:
+        from rich.markdown import Markdown
+
+        done = attend(session, console.input, lambda text: console.print(Markdown(text)))
+        return 0 if done else 1
+    from imop.viewing.window import Window
+
+    with Window(session, host, port) as window:
+        if screenshot is not None:
+            from imop.viewing.browser import picture
+
+            with replaced(screenshot) as temporary:
+                temporary.write_bytes(picture(window.url, SIZE))
+            console.print(screenshot)
+            return 0
+        console.print(f"{window.url} shows it, until this command is interrupted")
+        threading.Event().wait()
+    return 0
