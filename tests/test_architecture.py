@@ -21,8 +21,8 @@ ALLOWED = {
     "robots": BASE | {"geometry"},
     "cameras": BASE | {"geometry"},
     "setup": BASE | {"geometry", "demos", "robots", "cameras", "sim", "terminal"},
+    "sim": BASE | {"geometry", "robots", "cameras"},
     "calibration": BASE | {"geometry", "demos", "robots", "cameras", "sim", "setup", "plugins", "terminal"},
-    "sim": BASE | {"geometry", "robots"},
     "tasks": BASE | {"geometry", "robots", "sim", "plugins"},
     "training": BASE | {"geometry", "demos", "networks", "policy", "robots", "sim"},
     "evaluation": BASE
@@ -34,6 +34,7 @@ ALLOWED = {
         "baselines",
         "training",
         "robots",
+        "setup",
         "sim",
         "tasks",
         "plugins",

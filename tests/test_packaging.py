@@ -14,6 +14,7 @@ from imop.tasks.expert import record_demonstration
 PYPROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())
 MODULES = {
     "sim": ("mujoco", "ompl", "toppra", "frankik", "gymnasium"),
+    "arms": ("mink",),
     "viz": ("matplotlib", "av"),
     "train": ("lightning_fabric", "tensorboard"),
     "baselines": ("open3d",),
@@ -64,7 +65,9 @@ def base_only() -> dict[str, str]:
     return dict(line.split() for line in done.stdout.splitlines())
 
 
-@pytest.mark.parametrize("package", ["cli", "demos", "geometry", "networks", "policy", "robots", "types"])
+@pytest.mark.parametrize(
+    "package", ["cameras", "cli", "demos", "geometry", "networks", "policy", "robots", "types"]
+)
 def test_the_base_is_all_that_a_policy_needs(base_only, package):
     lacking = {m: e for m, e in base_only.items() if m.split(".")[1] == package}
     assert lacking
@@ -82,6 +85,8 @@ def test_the_base_is_all_that_a_policy_needs(base_only, package):
         ("imop.serving.server", "serve"),
         ("imop.serving.command", "-"),
         ("imop.training.config", "-"),
+        ("imop.setup.arm", "-"),
+        ("imop.setup.picture", "viz"),
         ("imop.training.stage", "sim"),
         ("imop.viewing.cases", "-"),
         ("imop.viewing.draw", "-"),

@@ -19,6 +19,7 @@ from imop.errors import ImopError, InvalidInput, MissingExtra
 from imop.files import writable_folder
 from imop.reproduce.command import reproduce
 from imop.serving.command import serve
+from imop.setup.command import setup
 from imop.terminal import console, list_folder, status
 from imop.training.ablation import Ablation
 from imop.training.config import TrainConfig
@@ -165,6 +166,7 @@ def evaluate(
     jobs: int = 2,
     weights: Path | None = None,
     baselines: Path | None = None,
+    robot: Literal["panda", "iiwa14", "ur5e"] = "panda",
     out: Path = Path("runs/eval"),
 ) -> int:
     """Success rates of several methods on the same demonstrations and scenes.
@@ -198,6 +200,7 @@ def evaluate(
         weights: folder that `imop train` wrote, for the learned policy; by default the bundled weights.
         baselines: folder of the weights of act3d, rvt, rvt_ft and rvt_hdt (docs/baselines.md); by default
             runs/baselines.
+        robot: the arm, with the Panda's hand; all but the Panda need the extra arms, in the suite tabletop.
         out: folder for the results.
     """
     from imop.evaluation.benchmark import evaluate_suite
@@ -222,6 +225,7 @@ def evaluate(
         second_try,
         demonstrations,
         baselines,
+        robot,
     )
     results.save(out)
     console.print(results.table())
@@ -230,6 +234,7 @@ def evaluate(
 
 
 app.command(reproduce)
+app.command(setup)
 app.command(calibrate)
 app.command(serve)
 app.command(name="import")(cli_data.import_)
@@ -261,8 +266,8 @@ def predict(
         query_episode: number of the episode to predict.
         base: where the robot's base is in the recordings' frame, metres; by default as in the simulation,
             with a table at a height of 0.752 m.
-        robot: whose points are left out and which poses are reached: panda, or one's own, such as
-            my_robot:MyArm.
+        robot: whose points are left out and which poses are reached: panda, a set-up such as cell.toml, in
+            whose world the recordings are, or one's own, such as my_robot:MyArm.
         method: learned, replay, registration, textbook, or one's own, such as my_methods:MyPolicy.
         weights: folder that `imop train` wrote; by default the bundled weights.
         out: folder for the results.
@@ -272,6 +277,8 @@ def predict(
     from imop.evaluation.predict import draw_predictions, frame_of, predict_recorded, predictions_table
 
     writable_folder(out)
+    if base is not None and robot.endswith((".toml", ".json")):
+        raise InvalidInput("base", f"{base} together with {robot}", "one of the two; a set-up has the base")
     T_imop_world = frame_of(base)
     shown, recorded = load_demonstration(demo, demo_episode), load_demonstration(query, query_episode)
     shown, recorded = moved(shown, T_imop_world), moved(recorded, T_imop_world)
@@ -281,7 +288,7 @@ def predict(
         origin["weights"] = weights and f"{weights}"
         predictions = predict_recorded(shown, recorded, method, out, weights, T_imop_world, robot, origin)
         try:
-            draw_predictions(shown, recorded, predictions, out / "steps.png")
+            draw_predictions(shown, recorded, predictions, out / "steps.png", robot)
         except MissingExtra as error:
             console.print(f"no steps.png: {error}")
     console.print(predictions_table(predictions))

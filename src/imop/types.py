@@ -256,6 +256,9 @@ class Match:
 class Action:
     """A gripper pose to reach, then the state of the gripper (the paper's a = (T, λ)).
 
+    In a demonstration the pose is the one that the gripper *reached* before the fingers moved, not the one
+    that was commanded: what is predicted is carried over from it. A policy's action is a command.
+
     Attributes:
         T_world_gripper: (4, 4).
         gripper_open: state of the gripper after the motion.
@@ -307,6 +310,8 @@ class Keyframe:
 @dataclass(frozen=True, eq=False)
 class Demonstration:
     """One successful episode as macro-steps.
+
+    It should end with the release: what is still held at the end was not put anywhere.
 
     Attributes:
         keyframes: the steps; the state after step k is `after(k)`.

@@ -3,9 +3,11 @@ import pytest
 
 from imop.errors import InvalidInput
 from imop.evaluation.methods import make_policy
-from imop.evaluation.robots import robot_functions
+from imop.evaluation.robots import perception_for, robot_functions
 from imop.geometry import se3
 from imop.robots.panda import PANDA_HOME_Q, T_WORLD_BASE, panda_self_filter
+from imop.setup.file import save_setup
+from imop.setup.setup import CameraSetup, RobotSetup, Setup, WorkspaceSetup
 
 ARM = """
 import numpy as np
@@ -54,3 +56,22 @@ def test_the_panda_is_the_robot_by_default(rng):
 def test_what_is_no_robot_is_refused(name):
     with pytest.raises(InvalidInput, match="is_robot and reachable"):
         make_policy("registration", robot=name)
+
+
+def test_a_set_up_says_where_the_workspace_and_the_robot_are(tmp_path):
+    away = se3.make(se3.euler(z=0.4), (0.2, 0.3, -0.75))
+    setup = Setup(
+        RobotSetup("panda", PANDA_HOME_Q, away @ T_WORLD_BASE),
+        WorkspaceSetup((-1, -1, -0.2), (1, 1.2, 1), 0.0),
+        {"front": CameraSetup([[50, 0, 32], [0, 50, 24], [0, 0, 1]], (64, 48), np.eye(4))},
+    )
+    save_setup(setup, tmp_path / "cell.toml")
+    perception, reachable = perception_for(str(tmp_path / "cell.toml"))
+    assert perception.lower == (-1, -1, -0.2) and perception.upper == (1, 1.2, 1)
+    here, here_reached = robot_functions()
+    points = np.random.default_rng(1).uniform((-0.4, -0.3, 0.7), (0.6, 0.3, 1.7), (5000, 3))
+    there = perception.robot_mask(se3.apply(away, points), PANDA_HOME_Q, 1.0)
+    assert np.mean(there == here(points, PANDA_HOME_Q, 1.0)) > 0.999 and there.any()
+    for x in (0.3, 1.5):
+        T = se3.make(np.diag([-1.0, 1, -1]), (x, 0, 1.0))
+        assert reachable(away @ T) == here_reached(T)

@@ -125,7 +125,7 @@ def test_a_demonstration_that_is_kept_is_recorded_once_and_read_back_as_it_was(t
     trial = Trial("tabletop/lid_off_pot", 3)
     first = demonstration_for(trial, tmp_path)
 
-    def never(*_):
+    def never(*_, **options):
         raise AssertionError("recorded again")
 
     monkeypatch.setattr("imop.evaluation.trials.record_demonstration", never)

@@ -97,3 +97,15 @@ def test_hull_of_a_boxs_corners_is_the_box(rng):
     np.testing.assert_array_equal(exact < 0, hull < 0)
     np.testing.assert_allclose(hull[exact < 0], exact[exact < 0], atol=1e-9)
     assert np.all(hull <= exact + 1e-9)
+
+
+def test_the_hull_of_many_faces_is_exact_near_it_and_far_beyond_it(rng):
+    vertices = rng.normal(size=(300, 3)) * (0.2, 0.05, 0.03)
+    planes = primitives.half_spaces(vertices)
+    points = rng.uniform(-0.6, 0.6, (4000, 3))
+    everything = (points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+    found = primitives.convex(points, planes)
+    near = everything < primitives.FAR
+    np.testing.assert_allclose(found[near], everything[near])
+    assert np.all(found[~near] >= primitives.FAR) and np.all(found <= everything + 1e-12)
+    assert len(planes) > 40 and 50 < near.sum() < 3000

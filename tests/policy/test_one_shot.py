@@ -265,7 +265,7 @@ def _without_things(seen):
 
 def _things(observation):
     names = observation.instance_names
-    return [i for i, name in names.items() if not any(k in name for k in ("panda", "table", "floor", "wall"))]
+    return [i for i, name in names.items() if not any(k in name for k in ("robot", "table", "floor", "wall"))]
 
 
 def test_nothing_watched(perception, wanted):

@@ -1,4 +1,5 @@
 import pickle
+import re
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ from hypothesis import strategies as st
 
 from imop.errors import CorruptData, InvalidInput
 from imop.geometry import se3
+from imop.setup.check import check_setup
 from imop.setup.file import from_dict, load_setup, save_setup, to_dict
 from imop.setup.setup import Setup
 
@@ -160,3 +162,12 @@ def test_what_is_no_such_file_is_said(tmp_path):
         load_setup(write(tmp_path, "robot = ["))
     with pytest.raises(InvalidInput, match=r"\.toml or \.json"):
         save_setup(from_dict(plain()), tmp_path / "cell.yaml")
+
+
+def test_the_page_about_the_set_up_shows_one_without_faults(tmp_path):
+    page = (Path(__file__).parents[2] / "docs" / "real_robot" / "setup.md").read_text()
+    first, second = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
+    setup = load_setup(write(tmp_path, first))
+    assert [str(f) for f in check_setup(setup)] == []
+    other = first[first.index("[workspace]") :]
+    assert load_setup(write(tmp_path, second + other)).gripper is not None

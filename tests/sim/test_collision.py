@@ -33,7 +33,7 @@ def finger_end() -> float:
     world = World(scene_spec())
     T_gripper_world = se3.invert(world.T_world_gripper)
     fingers = [
-        i for i in range(world.model.ngeom) if world.model.geom(i).name.startswith("panda/left_finger")
+        i for i in range(world.model.ngeom) if world.model.geom(i).name.startswith("robot/left_finger")
     ]
     probe = [
         (T_gripper_world[2, :3] @ world.data.geom_xpos[i] + T_gripper_world[2, 3])

@@ -64,8 +64,37 @@ def test_unknown_names_are_refused(arm):
     for arguments in (
         {"joint_names": ["elbow"]},
         {"joint_names": []},
-        {"joint_names": ["turn"], "finger_joint_names": ["thumb"]},
+        {"joint_names": ["turn"], "fingers": ["thumb"]},
         {"joint_names": ["turn"], "margin": {"ball": 0.1}},
     ):
         with pytest.raises(InvalidInput):
             mjcf_self_filter(arm, **arguments)
+
+
+OPPOSED = """
+<mujoco><worldbody><body name="base"><joint name="turn" axis="0 0 1"/>
+  <geom type="box" size=".05 .1 .02" pos="0 0 .2"/>
+  <body name="left" pos="0 0 .1"><joint name="l" type="slide" axis="0 1 0" range="0 .04"/>
+    <geom type="box" size=".01 .005 .05" pos="0 .005 0"/></body>
+  <body name="right" pos="0 0 .1"><joint name="r" type="slide" axis="0 1 0" range="-.04 0"/>
+    <geom type="box" size=".01 .005 .05" pos="0 -.005 0"/></body>
+</body></worldbody></mujoco>
+"""
+
+
+def test_opposed_fingers_have_ranges_of_their_own():
+    model, q = mujoco.MjModel.from_xml_string(OPPOSED), np.zeros(1)
+    fingers = {"l": (0.0, 0.04), "r": (0.0, -0.04)}
+    found = mjcf_self_filter(model, ["turn"], fingers)
+    pads = np.array([(0, 0.045, 0.06), (0, -0.045, 0.06)])
+    assert found.is_robot(pads, q, 1.0).all() and not found.is_robot(pads, q, 0.0).any()
+
+
+def test_a_held_block_stays_in_the_cloud(rng):
+    """4 cm between the fingers: all of its faces, but those that the fingers touch, are seen."""
+    model, q = mujoco.MjModel.from_xml_string(OPPOSED), np.zeros(1)
+    found = mjcf_self_filter(model, ["turn"], {"l": (0.0, 0.04), "r": (0.0, -0.04)})
+    block = rng.uniform(-0.02, 0.02, (2000, 3))
+    block[np.arange(2000), rng.integers(0, 3, 2000)] = rng.choice([-0.02, 0.02], 2000)
+    free = np.abs(block[:, 1]) < 0.018
+    assert not found.is_robot(block + np.array([0, 0, 0.06]), q, 0.5)[free].any()

@@ -10,8 +10,9 @@ from imop.errors import PlanFailed
 from imop.geometry import se3
 from imop.robots.panda import JOINT_LOWER, JOINT_UPPER, PANDA_HOME_Q, tip_pose
 from imop.sim import motion
+from imop.sim.arms import PANDA
 from imop.sim.gripper import attach
-from imop.sim.motion import ACCELERATION, PERIOD, VELOCITY, Planner, Trajectory
+from imop.sim.motion import ACCELERATION, PERIOD, Planner, Trajectory
 from imop.sim.world import TABLE_HEIGHT, World, allow_grasp, scene_spec
 from imop.types import FloatArray
 
@@ -43,7 +44,7 @@ def contacts(world: World, q: FloatArray) -> set[frozenset[str]]:
     bodies = world.model.geom_bodyid[world.data.contact.geom[world.data.contact.dist < 0]]
     pairs = {frozenset(world.model.body(int(i)).name for i in pair) for pair in bodies}
     world.restore_state(state)
-    return {pair for pair in pairs if any(name.startswith("panda/") for name in pair)}
+    return {pair for pair in pairs if any(name.startswith("robot/") for name in pair)}
 
 
 def test_motion_goes_round_a_wall_without_touching_it() -> None:
@@ -66,7 +67,7 @@ def test_trajectory_reaches_the_goal_and_keeps_the_limits() -> None:
     assert se3.translation_distance(tip_pose(t.positions[-1]), goal) < 1e-4
     assert se3.rotation_distance(tip_pose(t.positions[-1]), goal) < 1e-3
     assert np.all(t.positions >= JOINT_LOWER - 1e-6) and np.all(t.positions <= JOINT_UPPER + 1e-6)
-    assert np.all(np.abs(t.velocities) <= VELOCITY * 1.02)
+    assert np.all(np.abs(t.velocities) <= PANDA.velocity * 1.02)
     assert np.all(t.velocities[[0, -1]] == 0)
     steps = np.diff(t.times)
     assert np.all(steps > 0) and steps.max() < PERIOD * 1.01
@@ -200,4 +201,4 @@ def test_a_line_through_a_singularity_is_no_straight_path():
     straight = np.linspace(PANDA_HOME_Q, PANDA_HOME_Q + 0.02, 5)
     swinging = straight.copy()
     swinging[2, 0] += 0.2
-    assert motion._off_line(straight) < 0.002 < motion._off_line(swinging)
+    assert motion._off_line(straight, PANDA) < 0.002 < motion._off_line(swinging, PANDA)

@@ -56,7 +56,7 @@ def test_an_instance_is_what_moves_rigidly_together() -> None:
     assert instance["cube"] == instance["knob"] and instance["cabinet"] == instance["shelf"]
     assert len({instance["cube"], instance["cabinet"], drawer}) == 3
     robot = {int(world.instances[i]) for i in world.robot_bodies}
-    assert len(robot) == 1 and world.instance_names[robot.pop()] == "panda"
+    assert len(robot) == 1 and world.instance_names[robot.pop()] == "robot"
     assert world.instance_names[drawer] == "drawer"
     assert {"table", "wall", "floor", "cube", "cabinet"} <= set(world.instance_names.values())
 

@@ -46,7 +46,7 @@ def done_from_the_beginning(env):
 )
 def test_what_is_to_be_taken_stands_elsewhere_as_it_stood(kind, after, near, far):
     env = disturbed(RING, kind)
-    others = [name for name in env.world.instance_names.values() if name not in ("panda", "ring/body")]
+    others = [name for name in env.world.instance_names.values() if name not in ("robot", "ring/body")]
     stood = {name: env.world.pose(name) for name in others}
     step, before = until_disturbed(env)
     now = env.world.pose("ring/body")

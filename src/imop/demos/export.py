@@ -15,7 +15,7 @@ from PIL import Image
 
 from imop.demos import rlbench_pickle
 from imop.demos.keyframes import STOP_BUFFER, published_keyframes
-from imop.demos.low_dim import FINGER_STROKE, JOINT_4_OFFSET, LOW_DIM
+from imop.demos.low_dim import FINGER_STROKE, JOINT_4_OFFSET, LOW_DIM, PANDA_JOINTS
 from imop.demos.rlbench import CAMERAS
 from imop.demos.store import DemonstrationStore
 from imop.errors import InvalidInput
@@ -39,7 +39,8 @@ def export_rlbench(
     """Write all demonstrations of a store as TASK/all_variations/episodes/episodeN below `out`.
 
     Object poses, names of instances and the seed of the objects have no place in that layout. An action's
-    pose is there the pose that the gripper has afterwards.
+    pose is there the pose that the gripper has afterwards. Joint 4 of an arm with seven joints is shifted
+    as RLBench's Panda is; the importer shifts it back.
 
     Args:
         source: the store.
@@ -112,7 +113,7 @@ def _check(records: list[rlbench_pickle.Observation]) -> None:
     wanted = list(range(COPIES + 1, len(records), COPIES + 1))
     if found != wanted:
         raise InvalidInput(
-            "keyframes", f"would be found at {found} instead of {wanted}", "7 joint velocities"
+            "keyframes", f"would be found at {found} instead of {wanted}", "joint velocities that say so"
         )
 
 
@@ -120,11 +121,12 @@ def _record(
     demonstration: Demonstration, observation: Observation, step: int, moving: bool
 ) -> rlbench_pickle.Observation:
     q, dq = observation.joint_positions, observation.joint_velocities
-    if q is None or q.shape != (7,):
-        raise InvalidInput("joint_positions", "missing or not of seven joints", "(7,) radians of a Panda")
-    at_rest = dq if dq is not None and np.abs(dq).max() <= _AT_REST else np.zeros(7)
+    if q is None:
+        raise InvalidInput("joint_positions", "missing", "those of the arm, radians")
+    at_rest = dq if dq is not None and np.abs(dq).max() <= _AT_REST else np.zeros(len(q))
     q_recorded = q.copy()
-    q_recorded[3] -= JOINT_4_OFFSET
+    if len(q) == PANDA_JOINTS:
+        q_recorded[3] -= JOINT_4_OFFSET
     before = demonstration.keyframes[step - 1].action if step else None
     is_open = before.gripper_open if before else observation.gripper_opening > 0.5
     misc: dict[str, Any] = {}
@@ -133,9 +135,9 @@ def _record(
     nothing = {f"{camera}_{kind}": None for camera in CAMERAS for kind in _IMAGES}
     return rlbench_pickle.Observation(
         **nothing,
-        joint_velocities=np.full(7, 1.0) if moving else np.array(at_rest),
+        joint_velocities=np.ones(len(q)) if moving else np.array(at_rest),
         joint_positions=q_recorded,
-        joint_forces=np.zeros(7),
+        joint_forces=np.zeros(len(q)),
         gripper_open=1.0 if is_open else 0.0,
         gripper_pose=se3.to_pose7(observation.T_world_gripper),
         gripper_matrix=np.array(observation.T_world_gripper),

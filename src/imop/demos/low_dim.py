@@ -21,7 +21,7 @@ TIME_STEP = 0.05
 """Seconds from one frame to the next."""
 
 # RLBench's model of the Panda has the zero of joint 4 turned by 4 degrees against Franka's.
-JOINT_4_OFFSET = 0.0698
+PANDA_JOINTS, JOINT_4_OFFSET = 7, 0.0698
 
 
 class Frame:
@@ -66,9 +66,10 @@ class Frame:
 
     @property
     def joint_positions(self) -> FloatArray:
-        """(7,) radians in Franka's convention."""
-        q = self.numbers("joint_positions", (7,)).copy()
-        q[3] += JOINT_4_OFFSET
+        """(J,) radians; seven are taken for RLBench's Panda, and given in Franka's convention."""
+        q = self.numbers("joint_positions", (None,)).copy()
+        if len(q) == PANDA_JOINTS:
+            q[3] += JOINT_4_OFFSET
         return q
 
     @property

@@ -21,7 +21,8 @@ from imop.types import FloatArray, Keyframe
 Aim = tuple[str, int, int]
 """Task, variation, and seed of the objects (-1 if it is not known); see `DemonstrationStore.aims`."""
 
-BACKGROUND = ("floor", "wall", "table", "panda")
+# Recordings of earlier versions call the robot panda.
+BACKGROUND = ("floor", "wall", "table", "robot", "panda")
 """Instances that are never a region: the robot itself, and what stands still whatever is done."""
 VOXEL = 0.004
 """Segments are thinned to this, metres, so that the wrist's close view does not outweigh the others."""

@@ -26,6 +26,7 @@ from imop.evaluation.trials import (
     suite_trials,
 )
 from imop.policy.one_shot import OneShotPolicy
+from imop.sim.arms import PANDA, find_arm
 from imop.tasks.disturbances import DISTURBANCES
 from imop.tasks.expert import ExpertFailed, perform
 from imop.tasks.layout import NoRoom
@@ -70,6 +71,7 @@ def evaluate_suite(
     second_try: bool = False,
     demonstrations: int = 1,
     baselines: Path | None = None,
+    robot: str = PANDA.name,
 ) -> Results:
     """Try every method in the same `episodes` scenes of every task.
 
@@ -91,15 +93,23 @@ def evaluate_suite(
         second_try: whether an episode goes on after a motion that cannot be planned, as a disturbed one does.
         demonstrations: how many are shown, each but the first of another instance.
         baselines: folder of the regressors' weights; None for the default one.
+        robot: the arm that shows and acts, see `sim.arms.ARMS`.
 
     Raises:
-        InvalidInput: for an unknown suite, split, task, method, change or disturbance, no demonstration, or
-            other instances where there are none.
+        InvalidInput: for an unknown suite, split, task, method, change, disturbance or robot, no
+            demonstration, or other instances or robots where there are none.
+        MissingExtra: if the robot's model is not installed.
         CorruptData: if the log cannot be read.
     """
     trials = suite_trials(suite, split, tasks, episodes, seed, instance, change, instances == "other")
+    if robot != PANDA.name and suite == "rlbench":
+        raise InvalidInput("robot", f"{robot} in suite {suite}", "panda; other arms in suite tabletop")
+    find_arm(robot)
     trials = {
-        task: [replace(trial, second_try=second_try, demonstrations=demonstrations) for trial in of_task]
+        task: [
+            replace(trial, second_try=second_try, demonstrations=demonstrations, robot=robot)
+            for trial in of_task
+        ]
         for task, of_task in trials.items()
     }
     without = set(trials)
@@ -114,6 +124,7 @@ def evaluate_suite(
     notes = [*NOTES, SECOND_TRY if second_try or disturb else ENDS, OTHER if instances == "other" else SAME]
     notes += [f"Shown were {demonstrations} demonstrations, each of another instance."] * (demonstrations > 1)
     notes += change_notes(trials, change)
+    notes += [f"The arm is the {robot}, with the Panda's hand."] * (robot != PANDA.name)
     if disturb:
         notes += disturbance_notes(disturb, found, sorted(without - set(trials)))
     return Results(suite, names, seed, counts, tuple(notes), change, instances, disturb)
@@ -145,7 +156,7 @@ class Shown:
         demonstrations: one or more.
     """
 
-    key: tuple[str, int, int, str, int]
+    key: tuple[str, int, int, str, int, str]
     demonstrations: tuple[Demonstration, ...] = field(compare=False)
 
 
@@ -231,7 +242,7 @@ def attempt(
             policy = make_policy(method, env.world)
             policy.watch(first)
         else:
-            policy = _watched(shown, method, state, weights, focus)
+            policy = _watched(shown, method, state, weights, focus, trial.robot)
         result = rollout(env, policy, most_actions(method, first, trial, env.task), point=point)
     except (MissingExtra, AssetMissing):
         raise  # says nothing about the method
@@ -253,12 +264,13 @@ def count_of(episodes: Iterable[Episode]) -> Count:
 
 
 @lru_cache(maxsize=1)
-def _watched(shown: Shown, method: str, state: str, weights: Path | None, focus: bool) -> Policy:
+def _watched(shown: Shown, method: str, state: str, weights: Path | None, focus: bool, robot: str) -> Policy:
     """A policy that was shown the demonstrations, for watching takes as long as an episode.
 
     The state tells it from one of other weights in the same folder.
     """
-    policy, (first, *others) = make_policy(method, weights=weights), shown.demonstrations
+    policy = make_policy(method, weights=weights, robot=robot)
+    first, *others = shown.demonstrations
     if focus:
         assert isinstance(policy, OneShotPolicy)
         policy.watch(first.stripped(), pointing(first)(0, first.keyframes[0].observation))
@@ -268,7 +280,7 @@ def _watched(shown: Shown, method: str, state: str, weights: Path | None, focus:
     return policy
 
 
-def shown_together(trial: Trial) -> tuple[str, int, int, str, int]:
+def shown_together(trial: Trial) -> tuple[str, int, int, str, int, str]:
     """What trials with the same demonstrations have in common."""
     shown = trial.demonstrated
-    return shown.task, shown.variation, shown.instance, shown.change, shown.demonstrations
+    return shown.task, shown.variation, shown.instance, shown.change, shown.demonstrations, shown.robot

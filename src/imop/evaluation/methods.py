@@ -10,9 +10,8 @@ from imop.baselines.policy import REGRESSORS, make_regressor
 from imop.errors import InvalidInput
 from imop.evaluation.oracle import OraclePolicy, Poses
 from imop.evaluation.replay import ReplayPolicy
-from imop.evaluation.robots import PANDA, robot_functions
+from imop.evaluation.robots import PANDA, perception_for
 from imop.evaluation.textbook import TextbookMatcher
-from imop.geometry.perception import Perception
 from imop.networks.model import BUNDLED
 from imop.policy.interfaces import Matcher
 from imop.policy.one_shot import OneShotPolicy
@@ -69,7 +68,7 @@ def make_policy(
         min_confidence: of the one-shot policies.
         weights: folder of the networks' weights; by default the bundled ones. Registration asks the
             verification network alone. Of the regressors, the folder of points/, views/ and views_hdt/.
-        robot: name of the robot, see `robot_functions`; one's own method deals with it itself.
+        robot: name of the robot, see `perception_for`; one's own method deals with it itself.
 
     Raises:
         InvalidInput: for an unknown method or robot, what makes no policy, or an oracle without a world.
@@ -78,8 +77,7 @@ def make_policy(
     """
     if method == "replay":
         return ReplayPolicy()
-    is_robot, reachable = robot_functions(robot)
-    perception = Perception(is_robot)
+    perception, reachable = perception_for(robot)
     if method in ("registration", "textbook"):
         registered = method == "registration"
         matcher: Matcher = (

@@ -27,6 +27,8 @@ GRIPPER_COLOR = "#1f3fbf"
 MAX_LINES = 60
 # Metres between the points of a scene as drawn.
 SPACING = 0.006
+Bounds = tuple[tuple[float, float, float], tuple[float, float, float]]
+"""Lower and upper corner of what is drawn, metres."""
 # Distance (metres) between the two scenes as drawn.
 GAP = 1.3
 
@@ -60,6 +62,7 @@ class Panel:
     query: Observation
     action: Action
     title: str = ""
+    bounds: Bounds = (WORKSPACE_LOWER, WORKSPACE_UPPER)
 
 
 def save_picture(panels: Sequence[Panel], path: Path) -> None:
@@ -76,7 +79,7 @@ def save_picture(panels: Sequence[Panel], path: Path) -> None:
 def _draw(axis: Axes, panel: Panel) -> None:
     right = np.array([GAP, 0.0])
     for observation, shift in ((panel.support.observation, np.zeros(2)), (panel.query, right)):
-        cloud = scene_cloud(observation)
+        cloud = scene_cloud(observation, panel.bounds)
         draw_points(axis, cloud.points, cloud.colors, shift)
     match = panel.action.match
     if match is not None:
@@ -95,9 +98,9 @@ def _draw(axis: Axes, panel: Panel) -> None:
     axis.set_axis_off()
 
 
-def scene_cloud(observation: Observation) -> PointCloud:
+def scene_cloud(observation: Observation, bounds: Bounds = (WORKSPACE_LOWER, WORKSPACE_UPPER)) -> PointCloud:
     """What is seen of the workspace, thinned for a picture."""
-    cloud = clouds.crop(clouds.fuse(observation), WORKSPACE_LOWER, WORKSPACE_UPPER)
+    cloud = clouds.crop(clouds.fuse(observation), *bounds)
     return clouds.voxel_downsample(cloud, SPACING)
 
 

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from imop.evaluation.methods import Policy, make_policy
 from imop.evaluation.report import save_json
-from imop.evaluation.robots import PANDA
+from imop.evaluation.robots import PANDA, perception_for
 from imop.geometry import se3
 from imop.geometry.accuracy import FINE
 from imop.robots.panda import T_WORLD_BASE
@@ -85,7 +85,7 @@ def predict_recorded(
         weights: folder of the learned policy's weights; by default the bundled ones.
         T_imop_world: (4, 4) by which both were moved before (see `frame_of`); poses are written as they were
             recorded.
-        robot: its name, see `robot_functions`.
+        robot: its name, see `perception_for`.
         origin: where all of it was read, to be written into result.json too.
 
     Raises:
@@ -123,20 +123,28 @@ def frame_of(p_world_base: tuple[float, float, float] | None) -> FloatArray:
 
 
 def draw_predictions(
-    demonstration: Demonstration, recorded: Demonstration, predictions: list[Prediction], path: Path
+    demonstration: Demonstration,
+    recorded: Demonstration,
+    predictions: list[Prediction],
+    path: Path,
+    robot: str = PANDA,
 ) -> None:
     """Draw the demonstrated step and the predicted action of every keyframe into a PNG.
+
+    The workspace is that of the robot, see `perception_for`.
 
     Raises:
         MissingExtra: without Matplotlib.
     """
     from imop.evaluation.picture import Panel, save_picture
 
+    perception, _ = perception_for(robot)
+    bounds = perception.lower, perception.upper
     panels = []
     for p in predictions:
         step = p.action.match.step if p.action.match else min(p.step, len(demonstration) - 1)
         seen = recorded.keyframes[p.step].observation
-        panels.append(Panel(demonstration.keyframes[step], seen, p.action, f"step {p.step}"))
+        panels.append(Panel(demonstration.keyframes[step], seen, p.action, f"step {p.step}", bounds))
     save_picture(panels, path)
 
 

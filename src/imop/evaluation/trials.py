@@ -14,6 +14,7 @@ from imop.baselines.policy import REGRESSORS
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.fingerprint import code_digest, own_code_digest
 from imop.evaluation.splits import chosen_tasks
+from imop.sim.arms import PANDA, find_arm
 from imop.sim.sensing import Sensing
 from imop.tasks.changes import FACTORS, Change, changes_of, read_factors
 from imop.tasks.disturbances import can_happen, require_disturbance
@@ -46,6 +47,7 @@ class Trial:
         disturb: what goes wrong once, see `tasks.disturbances.DISTURBANCES`; nothing if empty.
         second_try: whether the episode goes on after a motion that cannot be planned. It does if disturbed.
         demonstrations: how many are shown, all but the first of other instances that are never tested.
+        robot: the arm that acts, and that showed the demonstrations; see `sim.arms.ARMS`.
 
     Raises:
         InvalidInput: for a negative seed, no demonstration, or an unknown change or disturbance.
@@ -61,6 +63,7 @@ class Trial:
     disturb: str = ""
     second_try: bool = False
     demonstrations: int = 1
+    robot: str = PANDA.name
 
     def __post_init__(self) -> None:
         for name in ("seed", "instance", "shown"):
@@ -110,6 +113,7 @@ class Trial:
             sense=self.changed.tested,
             disturb=self.disturb,
             second_try=self.second_try,
+            arm=find_arm(self.robot),
         )
         env.reset(seed=self.seed, options={"variation": self.variation, "instance_seed": self.instance})
         return env
@@ -151,15 +155,23 @@ def _demonstration(trial: Trial, first_seed: int, instance: int, kept: Path | No
     code = [code_digest(imop.sim, imop.robots, imop.tasks), *own_code_digest(find_task(trial.task))]
     recorded = Memory(kept, verbose=0, compress=1).cache(_recorded)
     variation = trial.demonstrated.variation
-    return _seen(recorded(code, trial.task, variation, instance, first_seed), trial.changed.shown)
+    asked = code, trial.task, variation, instance, first_seed, trial.robot
+    return _seen(recorded(*asked), trial.changed.shown)
 
 
-def _recorded(code: list[str], name: str, variation: int, instance: int, first_seed: int) -> Demonstration:
+def _recorded(
+    code: list[str],
+    name: str,
+    variation: int,
+    instance: int,
+    first_seed: int,
+    robot: str,
+) -> Demonstration:
     """The first demonstration that succeeds; what is kept is that of the same `code`."""
     task = make_task(name)
     for seed in range(first_seed, first_seed + _RECORDING_ATTEMPTS):
         try:
-            return record_demonstration(task, seed, variation, instance)
+            return record_demonstration(task, seed, variation, instance, arm=find_arm(robot))
         except (ExpertFailed, NoRoom) as error:
             failure: ImopError = error
     raise failure

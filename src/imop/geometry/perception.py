@@ -1,5 +1,6 @@
 """From an observation to the cloud that everything else works on, with no privileged information."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -8,10 +9,11 @@ from scipy import ndimage
 
 from imop.errors import InvalidInput
 from imop.geometry import cloud as clouds
+from imop.geometry import se3
 from imop.geometry.cloud import PointCloud
 from imop.types import BoolArray, FloatArray, Observation
 
-# The crop that PerAct, RVT and IMOP use on RLBench, metres.
+# The crop that PerAct, RVT and IMOP use on RLBench, metres; what a cell has instead, its set-up says.
 WORKSPACE_LOWER = (-0.3, -0.5, 0.6)
 WORKSPACE_UPPER = (0.7, 0.5, 1.6)
 
@@ -26,8 +28,20 @@ OPEN_CELL, FLAT = 0.0125, 0.004
 # A point of the plane whose colour differs by more is a mark on it, unless less than this share is plain.
 MARKED, PLAIN_SHARE = 0.15, 0.8
 
+# Points of a hand in the gripper's frame, and how near to them something is measured, metres.
+_HAND = np.array([(0.0, 0.0, z) for z in (-0.13, -0.11, -0.09, -0.07)])
+NEAR_HAND = 0.06
+NOTHING_REMOVED = (
+    "the self-filter removed nothing, although {} measure something where the hand is; the robot stays in "
+    "the cloud. Is the robot's base where the filter has it, and are the joint positions those of its model?"
+)
+
 # Which of the points (N, 3) belong to the robot, given its joint positions and gripper opening.
 RobotMask = Callable[[FloatArray, FloatArray, float], BoolArray]
+
+
+class SelfFilterWarning(UserWarning):
+    """The self-filter removes nothing although the robot is in view."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +90,10 @@ class Perception:
         everything = clouds.fuse(observation)
         cloud = clouds.crop(everything, self.lower, self.upper)
         if self.robot_mask is not None:
-            cloud = cloud.select(~self._robot(cloud, observation, self.robot_mask))
+            robot = self._robot(cloud, observation, self.robot_mask)
+            if len(robot) and not np.any(robot) and (names := views_of_hand(observation)):
+                warnings.warn(NOTHING_REMOVED.format(", ".join(names)), SelfFilterWarning, stacklevel=2)
+            cloud = cloud.select(~robot)
         if not len(cloud):
             raise self._nothing(everything)
         cloud = clouds.voxel_downsample(cloud, self.voxel)
@@ -86,8 +103,9 @@ class Perception:
         low, high = np.percentile(everything.points, [5, 95], axis=0).round(2).tolist()
         problem = f"nothing is left in the workspace, most points lie between {low} and {high} m"
         accepted = (
-            f"points between {self.lower} and {self.upper} m, world frame; else say where the robot's base "
-            "is (imop predict --base), or give Perception the bounds of the workspace"
+            f"points between lower {self.lower} and upper {self.upper} m, world frame. If the table is "
+            "elsewhere, give the workspace of your cell: Perception(lower=..., upper=...), the table "
+            "[workspace] of a set-up, or the robot's base with imop predict --base"
         )
         return InvalidInput("views", problem, accepted)
 
@@ -97,6 +115,26 @@ class Perception:
             accepted = "joint angles in radians, or Perception(robot_mask=None)"
             raise InvalidInput("joint_positions", "missing, but the self-filter needs them", accepted)
         return robot_mask(cloud.points, observation.joint_positions, observation.gripper_opening)
+
+
+def views_of_hand(observation: Observation) -> list[str]:
+    """Names of the cameras that measure something where the hand is.
+
+    The hand is taken to be behind the gripper's tip, against the approach direction.
+    """
+    p_world = se3.apply(observation.T_world_gripper, _HAND)
+    names = []
+    for name, view in observation.views.items():
+        p = se3.apply(se3.invert(view.T_world_camera), p_world)
+        p = p[p[:, 2] > NEAR_HAND]
+        uv = np.round((p @ view.intrinsics.T)[:, :2] / p[:, 2:]).astype(np.int64)
+        height, width = view.depth.shape
+        inside = np.all((uv >= 0) & (uv < (width, height)), axis=1)
+        u, v = uv[inside].T
+        depth = np.where(view.measured[v, u], view.depth[v, u], np.inf)
+        if np.sum(np.abs(depth - p[inside, 2]) < NEAR_HAND) >= len(_HAND) / 2:
+            names.append(name)
+    return names
 
 
 def with_normals(cloud: PointCloud, observation: Observation, flat: BoolArray | None = None) -> PointCloud:

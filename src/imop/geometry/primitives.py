@@ -5,6 +5,7 @@ cylinders along z.
 """
 
 from functools import reduce
+from itertools import product
 
 import numpy as np
 from scipy.spatial import ConvexHull
@@ -21,6 +22,11 @@ PARALLEL_GRIPPER = np.array(
         [[-0.01, -0.05, -0.05], [0.01, 0.05, -0.01]],
     ]
 )
+
+FAR = 0.05
+"""Distances to hulls of meshes are exact up to here only, metres."""
+_SIDES = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+_SIDES /= np.linalg.norm(_SIDES, axis=1, keepdims=True)
 
 
 def sphere(p: FloatArray, size: FloatArray) -> FloatArray:
@@ -57,16 +63,28 @@ def ellipsoid(p: FloatArray, size: FloatArray) -> FloatArray:
 
 
 def half_spaces(vertices: FloatArray) -> FloatArray:
-    """Planes (M, 4) of the convex hull of `vertices` (N, 3): n.x + d <= 0 inside, |n| = 1."""
-    return np.unique(ConvexHull(vertices).equations.round(9), axis=0)
+    """Planes (M, 4) of the convex hull of `vertices` (N, 3): n.x + d <= 0 inside, |n| = 1.
+
+    The first ones face all sides, for `convex`.
+    """
+    planes = np.unique(ConvexHull(vertices).equations.round(9), axis=0)
+    first = np.unique((planes[:, :3] @ _SIDES.T).argmax(axis=0))
+    return np.concatenate([planes[first], np.delete(planes, first, axis=0)])
 
 
 def convex(p: FloatArray, planes: FloatArray) -> FloatArray:
     """Distances (N,) of points `p` (N, 3) to the solid behind `planes` (M, 4).
 
-    Exact inside and in front of faces; too small in front of edges and corners.
+    Exact inside and in front of faces; too small in front of edges and corners, and beyond `FAR`, but not
+    less than `FAR` there.
     """
-    return np.asarray((p @ planes[:, :3].T + planes[:, 3]).max(axis=1))
+    few = planes[: len(_SIDES)]
+    distance = np.asarray((p @ few[:, :3].T + few[:, 3]).max(axis=1))
+    if len(planes) > len(few):
+        # Most points are far from most solids, and hulls of meshes have thousands of planes.
+        near, rest = np.flatnonzero(distance < FAR), planes[len(few) :]
+        distance[near] = np.maximum(distance[near], (p[near] @ rest[:, :3].T + rest[:, 3]).max(axis=1))
+    return distance
 
 
 def _beyond(excess: FloatArray) -> FloatArray:

@@ -6,11 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from imop.errors import InvalidInput
-from imop.geometry import se3
+from imop.geometry import primitives, se3
 from imop.types import BoolArray, FloatArray, as_array
 
 Distance = Callable[[FloatArray, FloatArray], FloatArray]
 """Signed distances (N,) of points (N, 3) to a shape of some size, in its own frame; see `primitives`."""
+
+TipPose = Callable[[FloatArray], FloatArray]
+"""Joint positions (n,) -> T_world_gripper (4, 4)."""
 
 SolidPoses = Callable[[FloatArray, float], FloatArray]
 """Joint positions (n,) and gripper opening, 0 closed .. 1 open -> T_world_solid (S, 4, 4) of all solids."""
@@ -33,6 +36,12 @@ class Solid:
     margin: float
 
 
+def box(size: FloatArray, margin: float) -> Solid:
+    """A box of edges `size` (3,), metres, that removes points up to `margin` (metres) beyond its faces."""
+    half = as_array("size", size, (3,)) / 2
+    return Solid(primitives.box, half, float(np.linalg.norm(half)), margin)
+
+
 class SelfFilter:
     """Tells the robot's points from those of the scene by its own geometry at the measured joints.
 
@@ -44,10 +53,29 @@ class SelfFilter:
 
     def __init__(self, joints: int, bodies: Sequence[Sequence[Solid]], solid_poses: SolidPoses):
         self._joints, self._solid_poses = joints, solid_poses
+        self._given = bodies
         self._solids = [solid for body in bodies for solid in body]
         self._reach = np.array([solid.radius + solid.margin for solid in self._solids])
         ends = np.cumsum([len(body) for body in bodies])
         self._bodies = [range(end - len(body), end) for end, body in zip(ends, bodies, strict=True)]
+
+    def with_mounted(
+        self, solids: Sequence[Solid], T_gripper_solid: FloatArray, tip_pose: TipPose
+    ) -> "SelfFilter":
+        """The same filter, which knows parts that are mounted on the hand as well, such as a camera.
+
+        Args:
+            solids: the parts, see `box`.
+            T_gripper_solid: (S, 4, 4), where each is in the frame of the gripper.
+            tip_pose: the robot's forward kinematics.
+        """
+        if not solids:
+            return self
+
+        def poses(q: FloatArray, opening: float) -> FloatArray:
+            return np.concatenate([self._solid_poses(q, opening), tip_pose(q) @ T_gripper_solid])
+
+        return SelfFilter(self._joints, [*self._given, solids], poses)
 
     def is_robot(
         self, points: FloatArray, joint_positions: FloatArray, gripper_opening: float = 1.0

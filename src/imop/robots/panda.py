@@ -8,7 +8,7 @@ import numpy as np
 from imop.geometry import primitives, se3
 from imop.geometry.self_filter import Distance, SelfFilter, Solid
 from imop.robots.panda_shell import SHELLS, Shell
-from imop.types import FloatArray, as_array
+from imop.types import FloatArray, as_array, as_pose
 
 FINGER_STROKE = 0.04
 """How far each finger moves, metres."""
@@ -110,8 +110,16 @@ def body_poses(q: FloatArray, opening: float) -> FloatArray:
     return np.concatenate([T_WORLD_BASE[None], links[:7], np.stack([T_world_hand, left, right])])
 
 
-def panda_self_filter() -> SelfFilter:
-    """The filter that knows the Panda's points in a scene with its base at `T_WORLD_BASE`."""
+def panda_self_filter(T_world_base: FloatArray | None = None) -> SelfFilter:
+    """The filter that knows the Panda's points in a scene.
+
+    Args:
+        T_world_base: (4, 4), where its base stands; by default as in imop's own scenes and RLBench's,
+            `T_WORLD_BASE`. Anywhere else the filter removes nothing, or the wrong points.
+
+    Raises:
+        InvalidInput: if it is no rigid transformation.
+    """
     bodies = [
         [_solid(shell, FILTER_MARGIN.get(name, FILTER_MARGIN[""])) for shell in shells]
         for name, shells in SHELLS.items()
@@ -120,7 +128,10 @@ def panda_self_filter() -> SelfFilter:
         [se3.make(se3.euler(*shell.rpy), shell.position) for shells in SHELLS.values() for shell in shells]
     )
     body = np.repeat(np.arange(len(SHELLS)), [len(shells) for shells in SHELLS.values()])
-    return SelfFilter(7, bodies, lambda q, opening: body_poses(q, opening)[body] @ T_body_solid)
+    if T_world_base is None:
+        return SelfFilter(7, bodies, lambda q, opening: body_poses(q, opening)[body] @ T_body_solid)
+    moved = as_pose("T_world_base", T_world_base) @ se3.invert(T_WORLD_BASE)
+    return SelfFilter(7, bodies, lambda q, opening: moved @ body_poses(q, opening)[body] @ T_body_solid)
 
 
 def _solid(shell: Shell, margin: float) -> Solid:

@@ -93,12 +93,12 @@ class CollisionChecker:
         self._relax(q_goal, pressing[:, None] | pressing[None, :], -GOAL_DEPTH, 1e-5)
 
     def valid(self, q: FloatArray) -> bool:
-        """Whether the arm at `q` (7,) keeps its distances."""
+        """Whether the arm at `q` (J,) keeps its distances."""
         a, b, distance = self._near(q)
         return bool(np.all(distance >= self._threshold[a, b]))
 
     def valid_motion(self, q: FloatArray) -> bool:
-        """Whether all the straight joint motions between successive rows of `q` (n, 7) are valid."""
+        """Whether all the straight joint motions between successive rows of `q` (n, J) are valid."""
         return all(self.valid(row) for row in densify(q, RESOLUTION))
 
     def after_search(self) -> "CollisionChecker":
@@ -133,7 +133,7 @@ class _HeldBodies:
 
 
 def densify(q: FloatArray, resolution: float) -> FloatArray:
-    """Rows of `q` (n, 7) with rows put between them so that none are farther apart than `resolution`."""
+    """Rows of `q` (n, J) with rows put between them so that none are farther apart than `resolution`."""
     rows = [q[:1]]
     for a, b in itertools.pairwise(q):
         n = max(1, int(np.ceil(np.linalg.norm(b - a) / resolution)))

@@ -126,7 +126,7 @@ def move(world: World, trajectory: Trajectory, on_frame: OnFrame | None = None) 
 
 
 def _servo_target(world: World, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
-    """Where the servos (7,) must pull so that neither their damping nor the arm's inertia holds it back."""
+    """Where the servos (J,) must pull so that neither their damping nor the arm's inertia holds it back."""
     m, d = world.model, world.data
     acceleration, torque = np.zeros(m.nv), np.zeros(m.nv)
     acceleration[world.arm_dof] = ddq

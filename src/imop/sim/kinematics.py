@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from imop.geometry import se3
+from imop.robots import panda
 from imop.robots.panda import (
     JOINT_LOWER,
     JOINT_UPPER,
@@ -61,6 +62,24 @@ def _solutions(T_base_flange: FloatArray, q_reference: FloatArray, samples: int,
 def reachable(T_world_gripper: FloatArray) -> bool:
     """Whether the arm can put the tip at a pose (4, 4), collisions aside."""
     return len(inverse_kinematics(T_world_gripper, PANDA_HOME_Q, 1)) > 0
+
+
+class PandaKinematics:
+    """The functions of this module as the `Kinematics` of an arm."""
+
+    def tip_pose(self, q: FloatArray) -> FloatArray:
+        """T_world_gripper (4, 4) for joints (7,)."""
+        return panda.tip_pose(q)
+
+    def inverse(
+        self, T_world_gripper: FloatArray, q_reference: FloatArray, limit: int | None = None
+    ) -> FloatArray:
+        """As `inverse_kinematics`."""
+        return inverse_kinematics(T_world_gripper, q_reference, limit)
+
+    def follow(self, poses: FloatArray, q_start: FloatArray) -> FloatArray | None:
+        """As `follow`."""
+        return follow(poses, q_start)
 
 
 def line(T_from: FloatArray, T_to: FloatArray, steps: int) -> FloatArray:

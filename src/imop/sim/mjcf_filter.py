@@ -22,9 +22,10 @@ _ANALYTIC: dict[int, Distance] = {
 def mjcf_self_filter(
     model: mujoco.MjModel,
     joint_names: Sequence[str],
-    finger_joint_names: Sequence[str] = (),
+    fingers: Sequence[str] | Mapping[str, tuple[float, float]] = (),
     T_world_model: FloatArray | None = None,
     margin: float | Mapping[str, float] = 0.01,
+    finger_margin: float = 0.0015,
 ) -> SelfFilter:
     """The filter that knows the points of a robot in a MuJoCo model.
 
@@ -34,10 +35,14 @@ def mjcf_self_filter(
     Args:
         model: a model with the robot, alone or in a scene.
         joint_names: the arm's joints, in the order of the joint positions.
-        finger_joint_names: the gripper's joints; an opening of 1 puts each at the upper end of its range.
+        fingers: the gripper's joints, each with its positions when the gripper is closed and when it is open.
+            If only their names are given, those are the lower and the upper end of its range, which is wrong
+            for fingers that open towards the lower end.
         T_world_model: (4, 4), where the model's world frame lies in the world of the points.
         margin: how far beyond its surface a geom still removes points, metres; one number, or one per body
             name with "" for all others.
+        finger_margin: the same for bodies that the finger joints move and `margin` does not name. It is
+            small: around the fingers is what they hold. It is never larger than that of all others.
 
     Raises:
         InvalidInput: if a joint or body is not in the model, or a geom is of another type.
@@ -46,16 +51,19 @@ def mjcf_self_filter(
     joints = [_joint(model, name) for name in joint_names]
     if not joints:
         raise InvalidInput("joint_names", "empty", "the names of the arm's joints")
-    fingers = [_joint(model, name) for name in finger_joint_names]
-    lower, upper = model.jnt_range[fingers].reshape(-1, 2).T
+    finger_joints = [_joint(model, name) for name in fingers]
+    ends = fingers.values() if isinstance(fingers, Mapping) else model.jnt_range[finger_joints]
+    closed, opened = np.reshape(list(ends), (-1, 2)).T
     margins = {"": float(margin)} if isinstance(margin, int | float) else dict(margin)
+    of_fingers = min(finger_margin, margins.get("", 0.0))
+    margins = _finger_margins(model, finger_joints, of_fingers) | margins
     bodies = _bodies(model, int(model.body_rootid[model.jnt_bodyid[joints[0]]]), margins)
     numbers = [geom for _, geoms in bodies for geom in geoms]
 
     def geom_poses(q: FloatArray, opening: float) -> FloatArray:
         data = mujoco.MjData(model)
         data.qpos[model.jnt_qposadr[joints]] = q
-        data.qpos[model.jnt_qposadr[fingers]] = lower + opening * (upper - lower)
+        data.qpos[model.jnt_qposadr[finger_joints]] = closed + opening * (opened - closed)
         mujoco.mj_kinematics(model, data)
         poses: FloatArray = T @ se3.make(data.geom_xmat[numbers].reshape(-1, 3, 3), data.geom_xpos[numbers])
         return poses
@@ -70,6 +78,15 @@ def _joint(model: mujoco.MjModel, name: str) -> int:
         names = ", ".join(model.joint(i).name for i in range(model.njnt))
         raise InvalidInput("joint_names", f"no joint {name!r}", names)
     return int(index)
+
+
+def _finger_margins(model: mujoco.MjModel, joints: Sequence[int], margin: float) -> dict[str, float]:
+    """The margin of all bodies that some joints move."""
+    moved: set[int] = {int(model.jnt_bodyid[joint]) for joint in joints}
+    for body in range(model.nbody):  # parents come first
+        if int(model.body_parentid[body]) in moved:
+            moved.add(body)
+    return {model.body(body).name: margin for body in moved}
 
 
 def _bodies(model: mujoco.MjModel, root: int, margins: Mapping[str, float]) -> list[tuple[float, list[int]]]:

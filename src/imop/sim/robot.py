@@ -25,6 +25,7 @@ from imop.types import FloatArray
 
 ARM_JOINTS = tuple(f"joint{i}" for i in range(1, 8))
 FINGER_JOINTS = ("finger_joint1", "finger_joint2")
+FINGERS = ("left_finger", "right_finger")
 
 _MASS = {
     "link0": 0.629769,
@@ -88,7 +89,7 @@ _IGNORED_PAIRS = (
 
 
 def panda_spec() -> mujoco.MjSpec:
-    """The robot alone, base at the origin; attach it with prefix "panda/" at `T_WORLD_BASE`.
+    """The robot alone, base at the origin; attach it with prefix "robot/" at `T_WORLD_BASE`.
 
     Bodies link0 .. link7, hand, left_finger, right_finger; joints and actuators joint1 .. joint7
     (radians) and finger_joint1/2 (metres); site tip. All geoms are in group 0, for rays and collisions
@@ -110,12 +111,17 @@ def panda_spec() -> mujoco.MjSpec:
         limits = (JOINT_LOWER[i], JOINT_UPPER[i])
         joint.range = limits
         _add_actuator(spec, name, _STIFFNESS[i], _DAMPING[i], JOINT_TORQUE[i], limits)
-    hand = _add_body(body, "hand", T_LINK7_FLANGE @ T_FLANGE_HAND)
-    _add_tip(hand)
-    _add_fingers(spec, hand)
+    add_hand(spec, body, T_LINK7_FLANGE @ T_FLANGE_HAND)
     for first, second in _IGNORED_PAIRS:
         spec.add_exclude(bodyname1=first, bodyname2=second)
     return spec
+
+
+def add_hand(spec: mujoco.MjSpec, parent: mujoco.MjsBody, T_parent_hand: FloatArray) -> None:
+    """Mount the Panda's hand on a body: hand, left_finger, right_finger, finger_joint1/2 and the site tip."""
+    hand = _add_body(parent, "hand", T_parent_hand)
+    _add_tip(hand)
+    _add_fingers(spec, hand)
 
 
 def _add_body(parent: mujoco.MjsBody, name: str, T_parent_body: FloatArray) -> mujoco.MjsBody:
@@ -138,7 +144,7 @@ def _add_tip(hand: mujoco.MjsBody) -> None:
 def _add_fingers(spec: mujoco.MjSpec, hand: mujoco.MjsBody) -> None:
     """finger_joint1 on the hand's +y side, which is the -y side of the tip; the second mirrors the first."""
     places = (T_HAND_FINGER, T_HAND_FINGER @ T_FINGER_OTHER)
-    for name, body_name, T in zip(FINGER_JOINTS, ("left_finger", "right_finger"), places, strict=True):
+    for name, body_name, T in zip(FINGER_JOINTS, FINGERS, places, strict=True):
         finger = _add_body(hand, body_name, T)
         joint = finger.add_joint(
             name=name,

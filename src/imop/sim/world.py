@@ -12,23 +12,22 @@ import numpy as np
 
 from imop.errors import InvalidInput
 from imop.geometry import se3
-from imop.robots.panda import FINGER_STROKE, PANDA_HOME_Q, T_WORLD_BASE
+from imop.robots.panda import FINGER_STROKE
+from imop.sim.arms import PANDA, Arm
 from imop.sim.pictures import MeshPicture, find_pictures
-from imop.sim.robot import panda_spec
+from imop.sim.robot import FINGER_JOINTS
 from imop.types import FloatArray, IntArray, as_pose
 
 TABLE_HEIGHT = 0.75
 TABLE_LOWER = (-0.5, -0.55)
 TABLE_UPPER = (1.1, 0.55)
-ROBOT = "panda/"
+ROBOT = "robot/"
 GRASP = "grasp:"
 """Welds of this prefix, each followed by the body's name, say what the gripper may attach."""
 ATTACH_VOLUME = f"{ROBOT}attach_volume"
 TIME_STEP = 0.002
 CONTACT_SOLREF = (0.004, 1.0)
 DEFAULT_SOLREF = (0.02, 1.0)
-ARM_JOINTS = tuple(f"{ROBOT}joint{i}" for i in range(1, 8))
-FINGER_JOINTS = (f"{ROBOT}finger_joint1", f"{ROBOT}finger_joint2")
 
 
 def _box(body: Any, lower: tuple[float, ...], upper: tuple[float, ...], rgb: tuple[int, ...]) -> None:
@@ -41,8 +40,8 @@ def _box(body: Any, lower: tuple[float, ...], upper: tuple[float, ...], rgb: tup
     )
 
 
-def scene_spec() -> Any:
-    """Floor, wall, table and the arm (prefix "panda/"): a `mujoco.MjSpec` to add a task's objects to."""
+def scene_spec(arm: Arm = PANDA) -> Any:
+    """Floor, wall, table and an arm (prefix "robot/"): a `mujoco.MjSpec` to add a task's objects to."""
     spec = mujoco.MjSpec()
     spec.modelname = "imop"
     spec.option.timestep = TIME_STEP
@@ -61,8 +60,8 @@ def scene_spec() -> Any:
         for y in (TABLE_LOWER[1] + 0.05, TABLE_UPPER[1] - 0.1):
             _box(table, (x, y, 0), (x + 0.05, y + 0.05, TABLE_HEIGHT - 0.04), wood)
     world.add_light(pos=[0.5, 0, 3], dir=[0, 0, -1], castshadow=False)
-    base = world.add_frame(pos=T_WORLD_BASE[:3, 3], quat=se3.to_wxyz(T_WORLD_BASE))
-    spec.attach(panda_spec(), prefix=ROBOT, frame=base)
+    base = world.add_frame(pos=arm.T_world_base[:3, 3], quat=se3.to_wxyz(arm.T_world_base))
+    spec.attach(arm.spec(), prefix=ROBOT, frame=base)
     _add_attach_volume(spec)
     return spec
 
@@ -110,9 +109,14 @@ class WorldState:
 
 
 class World:
-    """A compiled scene and its state. The arm starts at `PANDA_HOME_Q` with the gripper open.
+    """A compiled scene and its state. The arm starts at its home with the gripper open.
+
+    Args:
+        spec: of the scene, from `scene_spec`.
+        arm: the one that the scene has.
 
     Attributes:
+        arm: the arm in the scene.
         model: the compiled MjModel.
         data: its MjData.
         instances: (bodies,) int32, the instance each body belongs to: what moves rigidly together is one
@@ -123,7 +127,8 @@ class World:
         light_color: (3,) red, green, blue, 0 .. 1, of the lamps as cameras see them; white.
     """
 
-    def __init__(self, spec: Any):
+    def __init__(self, spec: Any, arm: Arm = PANDA):
+        self.arm = arm
         self.model: Any = spec.compile()
         self.data: Any = mujoco.MjData(self.model)
         # Contacts of MuJoCo's default softness let fingers sink centimetres into what they hold.
@@ -142,14 +147,20 @@ class World:
         self.graspable = tuple(name.removeprefix(GRASP) for name in names if name.startswith(GRASP))
         self.unavoided: frozenset[int] = frozenset()
         self.light_color: FloatArray = np.ones(3)
-        self.arm_qpos = np.array([self.model.joint(name).qposadr[0] for name in ARM_JOINTS])
-        self.arm_dof = np.array([self.model.joint(name).dofadr[0] for name in ARM_JOINTS])
-        self.arm_ctrl = np.array([self.model.actuator(name).id for name in ARM_JOINTS])
-        self.finger_qpos = np.array([self.model.joint(name).qposadr[0] for name in FINGER_JOINTS])
-        self.finger_dof = np.array([self.model.joint(name).dofadr[0] for name in FINGER_JOINTS])
-        self.finger_ctrl = np.array([self.model.actuator(name).id for name in FINGER_JOINTS])
+        self.arm_qpos, self.arm_dof, self.arm_ctrl = self._addresses(arm.joints)
+        self.finger_qpos, self.finger_dof, self.finger_ctrl = self._addresses(FINGER_JOINTS)
         self._tip = self.model.site(f"{ROBOT}tip").id
-        self.set_robot(PANDA_HOME_Q, 1.0)
+        self.set_robot(arm.home, 1.0)
+
+    def _addresses(self, joints: tuple[str, ...]) -> tuple[IntArray, IntArray, IntArray]:
+        """Where positions, velocities and targets of the robot's joints stand."""
+        found = [self.model.joint(ROBOT + name) for name in joints]
+        actuators = [self.model.actuator(ROBOT + name).id for name in joints]
+        return (
+            np.array([joint.qposadr[0] for joint in found]),
+            np.array([joint.dofadr[0] for joint in found]),
+            np.array(actuators),
+        )
 
     @cached_property
     def pictures(self) -> dict[int, MeshPicture]:
@@ -157,7 +168,7 @@ class World:
         return find_pictures(self.model)
 
     def set_robot(self, q: FloatArray, opening: float) -> None:
-        """Put the arm at rest at `q` (7,) with the gripper at `opening` (0 closed .. 1 open)."""
+        """Put the arm at rest at `q` (J,) with the gripper at `opening` (0 closed .. 1 open)."""
         self.data.qpos[self.arm_qpos] = self.data.ctrl[self.arm_ctrl] = q
         self.data.qpos[self.finger_qpos] = self.data.ctrl[self.finger_ctrl] = opening * FINGER_STROKE
         self.data.qvel[self.arm_dof] = 0
@@ -226,12 +237,12 @@ class World:
 
     @property
     def robot_q(self) -> FloatArray:
-        """Joint positions of the arm (7,) radians, Franka's convention."""
+        """Joint positions of the arm (J,) radians; the Panda's in Franka's convention."""
         return np.array(self.data.qpos[self.arm_qpos])
 
     @property
     def robot_dq(self) -> FloatArray:
-        """Joint velocities of the arm (7,) radians per second."""
+        """Joint velocities of the arm (J,) radians per second."""
         return np.array(self.data.qvel[self.arm_dof])
 
     @property

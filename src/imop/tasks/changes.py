@@ -41,7 +41,7 @@ SCENE = ("object_color", "object_size", "light", "table_color", "distractors", "
 _DISTANCE, _ANGLE = 0.003, np.radians(0.5)
 _LEFT_OUT = "right_shoulder"
 _SHIFT, _TURN = 0.1, 0.05
-_ROOM = ("", "table", "floor", "wall", "panda")
+_ROOM = ("", "table", "floor", "wall", "robot")
 """Instances that are no things of a task."""
 
 

@@ -6,8 +6,6 @@ import numpy as np
 
 from imop.errors import PlanFailed
 from imop.geometry import se3
-from imop.robots.panda import PANDA_HOME_Q
-from imop.sim.kinematics import inverse_kinematics
 from imop.sim.motion import Planner
 from imop.sim.world import World
 from imop.tasks.waypoint import Waypoint
@@ -46,7 +44,7 @@ def at_rest(world: World, before: Mapping[str, FloatArray]) -> bool:
 
 def reachable(world: World, T_world_gripper: FloatArray, allow_collisions: bool) -> bool:
     """Whether some arm configuration reaches the pose, without touching anything unless that is allowed."""
-    candidates = inverse_kinematics(T_world_gripper, PANDA_HOME_Q, _CANDIDATES)
+    candidates = world.arm.kinematics.inverse(T_world_gripper, world.arm.home, _CANDIDATES)
     if allow_collisions or len(candidates) == 0:
         return len(candidates) > 0
     state = world.save_state()

@@ -9,6 +9,7 @@ from gymnasium import spaces
 
 from imop.errors import InvalidInput, PlanFailed
 from imop.geometry import se3
+from imop.sim.arms import PANDA, Arm
 from imop.sim.cameras import CAMERAS, observe
 from imop.sim.execute import execute
 from imop.sim.gripper import OnFrame
@@ -132,6 +133,7 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
         sense: looks at the world at a time step; `observation_space` describes the robot's own cameras.
         disturb: what goes wrong once in every episode, see `disturbances.DISTURBANCES`; nothing if empty.
         second_try: whether the episode goes on after a motion that cannot be planned. Nothing moves then.
+        arm: that acts.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 (Gymnasium's name and type)
@@ -146,9 +148,10 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
         sense: Callable[[World, int], Observation] = observe,
         disturb: str = "",
         second_try: bool = False,
+        arm: Arm = PANDA,
     ):
         self.task, self.variation, self.on_frame = task, variation, on_frame
-        self._change, self._sense = change, sense
+        self._change, self._sense, self._arm = change, sense, arm
         self._disturb, self.second_try = disturb, second_try
         self._disturber: Disturber | None = None
         self._step_limit = step_limit or task.step_limit
@@ -162,7 +165,7 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
                 **{name: _view_space() for name in CAMERAS},
                 "T_world_gripper": _real(4, 4),
                 "gripper_opening": spaces.Box(0, 1, (1,), np.float64),
-                "joint_positions": _real(7),
+                "joint_positions": _real(len(arm.joints)),
                 "time_step": spaces.Discrete(self._step_limit + 1),
             }
         )
@@ -204,7 +207,7 @@ class ImopEnv(gymnasium.Env[ObservationDict, FloatArray]):
         instance = int(given.pop("instance_seed", episode))
         if given:
             raise InvalidInput("options", ", ".join(map(str, given)), "variation, instance_seed")
-        self._world = make_scene(self.task, variation, instance, episode, self._change)
+        self._world = make_scene(self.task, variation, instance, episode, self._change, self._arm)
         disturb = self._disturb
         self._disturber = Disturber(disturb, self.task, self._world, episode) if disturb else None
         info = {

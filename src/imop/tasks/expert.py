@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from imop.errors import ImopError, PlanFailed
+from imop.sim.arms import PANDA, Arm
 from imop.sim.cameras import observe
 from imop.sim.execute import move, plan_for
 from imop.sim.gripper import OnFrame, set_gripper
@@ -26,6 +27,7 @@ def record_demonstration(
     variation: int = 0,
     instance_seed: int | None = None,
     on_frame: OnFrame | None = None,
+    arm: Arm = PANDA,
 ) -> Demonstration:
     """Let the expert do `task` once in a new scene.
 
@@ -35,6 +37,7 @@ def record_demonstration(
         variation: number of the aim.
         instance_seed: of the objects; `seed` if None.
         on_frame: called with the world every 0.05 simulated seconds.
+        arm: that does it.
 
     Returns:
         One keyframe per waypoint, with the privileged object names and poses.
@@ -44,7 +47,7 @@ def record_demonstration(
         InvalidInput: if the task has no such variation.
     """
     instance_seed = seed if instance_seed is None else instance_seed
-    world = make_scene(task, variation, instance_seed, seed)
+    world = make_scene(task, variation, instance_seed, seed, arm=arm)
     demonstration = perform(task, world, on_frame)
     seeds = {"instance": instance_seed, "episode": seed}
     words = task.instructions(variation)

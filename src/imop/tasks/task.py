@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from imop.errors import InvalidInput
+from imop.sim.arms import PANDA, Arm
 from imop.sim.gripper import PERIOD_STEPS, OnFrame
 from imop.sim.world import World, allow_grasp, scene_spec
 from imop.tasks.waypoint import Waypoint
@@ -122,7 +123,12 @@ def wait(task: Task, world: World, watch: OnFrame) -> bool:
 
 
 def make_scene(
-    task: Task, variation: int, instance_seed: int, seed: int, change: SceneChange | None = None
+    task: Task,
+    variation: int,
+    instance_seed: int,
+    seed: int,
+    change: SceneChange | None = None,
+    arm: Arm = PANDA,
 ) -> World:
     """The scene of one episode: same arguments, same scene.
 
@@ -132,6 +138,7 @@ def make_scene(
         instance_seed: decides shapes, sizes and colours of the task's objects.
         seed: decides poses and clutter.
         change: of this scene, if any.
+        arm: that stands in it.
 
     Raises:
         InvalidInput: if the task has no such variation.
@@ -139,14 +146,14 @@ def make_scene(
     """
     if not 0 <= variation < task.variations:
         raise InvalidInput("variation", f"{variation}", f"0 .. {task.variations - 1} for {task.name}")
-    spec = scene_spec()
+    spec = scene_spec(arm)
     task.build(spec, variation, np.random.default_rng((instance_seed, variation)))
     task.furnish(spec, np.random.default_rng((seed, 1)))
     if change is not None:
         change.furnish(spec)
     for body in task.graspable:
         allow_grasp(spec, body)
-    world = World(spec)
+    world = World(spec, arm)
     task.prepare(world)
     task.reset(world, np.random.default_rng((seed, 2)))
     if change is not None:

@@ -11,9 +11,8 @@ from imop.demos.load import load_demonstration
 from imop.errors import CorruptData, InvalidInput
 from imop.evaluation.methods import Policy, make_policy
 from imop.evaluation.predict import frame_of
-from imop.evaluation.robots import PANDA, robot_functions
+from imop.evaluation.robots import PANDA, perception_for
 from imop.files import read
-from imop.geometry.perception import Perception
 from imop.policy.one_shot import OneShotPolicy
 from imop.types import Demonstration
 from imop.viewing.deciders import ActingDecider, Decider, PolicyDecider
@@ -34,7 +33,7 @@ class Case:
         world: where it is carried over to.
         method: who decides, as for `make_policy`.
         weights: folder of its weights; by default the bundled ones.
-        robot: its name, see `robot_functions`.
+        robot: its name, see `perception_for`.
         steps: so many actions were taken before, if it was recorded.
         recovers: whether a one-shot policy tries again what came to nothing.
     """
@@ -57,7 +56,7 @@ class Case:
         policy.watch(self.demonstration.stripped())
         if isinstance(policy, OneShotPolicy):
             return PolicyDecider(policy, recovers=self.recovers)
-        return ActingDecider(policy, self.demonstration, Perception(robot_functions(self.robot)[0]))
+        return ActingDecider(policy, self.demonstration, perception_for(self.robot)[0])
 
 
 def simulated(

@@ -1,0 +1,52 @@
+"""`imop setup`: says what is wrong with a set-up."""
+
+from pathlib import Path
+from typing import Literal
+
+from tyro.conf import Positional
+
+from imop.errors import MissingExtra
+from imop.terminal import console, status
+
+
+def setup(
+    action: Positional[Literal["check"]],
+    file: Positional[Path],
+    seen: Path | None = None,
+    episode: int = 0,
+    out: Path = Path("runs/setup.png"),
+) -> int:
+    """Say what is wrong with a set-up, and draw what the self-filter leaves of the robot.
+
+    Exit code 1 if anything is wrong that a policy would suffer from.
+
+    Args:
+        action: check.
+        file: the set-up, .toml or .json (docs/real_robot/setup.md).
+        seen: store or folder with a recording of this set-up, whose first observation is compared with it.
+        episode: which episode of the recording.
+        out: PNG file for the picture; needs --seen and the extra viz.
+    """
+    from imop.demos.load import load_demonstration
+    from imop.setup.check import check_setup
+    from imop.setup.file import load_setup
+
+    found = load_setup(file)
+    observation = None if seen is None else load_demonstration(seen, episode).keyframes[0].observation
+    with status(f"checking {file}"):
+        findings = check_setup(found, observation)
+    for finding in findings:
+        console.print(str(finding), soft_wrap=True)
+    errors = sum(finding.severity == "error" for finding in findings)
+    if observation is not None and not any(f.where == "robot.model" for f in findings):
+        from imop.setup.arm import arm_of
+
+        try:
+            from imop.setup.picture import draw_filtered
+
+            draw_filtered(found, arm_of(found), observation, out)
+            console.print(out)
+        except MissingExtra as error:
+            console.print(f"no picture: {error}")
+    console.print(f"{file}: {errors} errors, {len(findings) - errors} warnings")
+    return 1 if errors else 0
