@@ -81,7 +81,7 @@ def simulated(
     from imop.viewing.simulated import SimulatedWorld
 
     shown = demonstration_for(trial) if demo is None else load_demonstration(*demo)
-    return Case(shown, SimulatedWorld(trial), method, weights, recovers=trial.second_try)
+    return Case(shown, SimulatedWorld(trial), method, weights, trial.robot, recovers=trial.second_try)
 
 
 def recorded(

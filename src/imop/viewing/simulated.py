@@ -3,7 +3,6 @@
 import numpy as np
 
 from imop.evaluation.trials import Trial
-from imop.robots.panda import tip_pose
 from imop.sim.execute import plan_for
 from imop.tasks.env import to_array
 from imop.types import Action, FloatArray, Observation
@@ -29,6 +28,7 @@ class SimulatedWorld:
         T_goal, free = action.T_world_gripper, action.allow_collisions
         planned = plan_for(self._env.world, T_goal, free, insist=self._env.task.insist)
         some = np.linspace(0, len(planned.positions) - 1, min(60, len(planned.positions))).astype(int)
+        tip_pose = self._env.world.arm.kinematics.tip_pose
         return np.stack([tip_pose(q)[:3, 3] for q in planned.positions[some]])
 
     def known(self) -> None:
