@@ -58,12 +58,12 @@ class Plane:
 
 @dataclass(frozen=True)
 class Perception:
-    """Fuse, crop, remove the robot, thin to voxels, estimate normals, cap the number of points.
+    """Fuse, crop, remove the robot, thin to voxels until they are few enough, estimate normals.
 
     Attributes:
         robot_mask: the self-filter; None leaves the robot in the cloud.
         voxel: edge of the grid, metres.
-        max_points: more are thinned by farthest point sampling.
+        max_points: if there are more, the grid is made coarser.
         lower, upper: (3,) bounds of the workspace, metres.
         align_views: whether a policy corrects the cameras' poses where views disagree, see `view_alignment`;
             the cloud of an observation is made with the poses that the observation says.
@@ -96,8 +96,12 @@ class Perception:
             cloud = cloud.select(~robot)
         if not len(cloud):
             raise self._nothing(everything)
-        cloud = clouds.voxel_downsample(cloud, self.voxel)
-        return cloud.select(clouds.farthest_points(cloud.points, self.max_points))
+        voxel, thin = self.voxel, clouds.voxel_downsample(cloud, self.voxel)
+        while len(thin) > self.max_points:
+            # A surface fills as many cells as the square of their edge goes into it.
+            voxel *= 1.02 * np.sqrt(len(thin) / self.max_points)
+            thin = clouds.voxel_downsample(cloud, voxel)
+        return thin
 
     def _nothing(self, everything: PointCloud) -> InvalidInput:
         low, high = np.percentile(everything.points, [5, 95], axis=0).round(2).tolist()
