@@ -70,7 +70,8 @@ def test_the_cap_holds_and_the_result_repeats():
     perception = Perception(max_points=300)
     first, second = perception(table_with_box()), perception(table_with_box())
     assert 200 < len(first) <= 300
-    # They are spread evenly: nothing that was there is farther away than the diagonal of its share of the table.
+    # They are spread evenly: nothing that was there is farther away than
+    # the diagonal of its share of the table.
     everything = Perception().points(table_with_box()).points
     share = np.sqrt(np.prod(np.ptp(everything, axis=0)[:2]) / len(first))
     assert nearest(everything, first.points)[0].max() < np.sqrt(2) * share
