@@ -33,7 +33,7 @@ def test_scenes_share_a_demonstration_only_if_it_shows_the_same(groups):
 
 
 def test_every_scene_is_acted_again_after_its_own_demonstration(groups, monkeypatch):
-    def record(task, seed, variation, instance):
+    def record(task, seed, variation, instance, **_):
         return SimpleNamespace(shown=(task.name, variation, instance))
 
     acted = {}

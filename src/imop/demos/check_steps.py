@@ -18,9 +18,6 @@ LARGEST_RADIANS = 4 * np.pi
 SMALLEST_DEPTH = 0.03
 LARGEST_WIDTH = 0.1
 
-# An opening between these has something between the closed fingers.
-EMPTY, HELD = 0.05, 0.95
-
 REACHED = (0.02, np.deg2rad(10))
 KINEMATIC = (0.02, np.deg2rad(5))
 MOUNTED = (0.005, np.deg2rad(2))
@@ -47,7 +44,6 @@ def check_demonstration(
     yield from _measurements(observations, where)
     yield from _cameras(observations, where)
     yield from _order(demonstration, observations, where)
-    yield from _release(demonstration, where)
     if wrong_units:
         return  # the rest would only repeat it
     yield from _agreement(observations, where)
@@ -144,14 +140,6 @@ def _order(demonstration: Demonstration, observations: list[Observation], where:
             )
             remedy = "gripper_open is the state after the motion, gripper_opening 0 closed .. 1 open"
             yield Finding("warning", f"{where}, step {k}, action.gripper_open", problem, remedy)
-
-
-def _release(demonstration: Demonstration, where: str) -> Iterator[Finding]:
-    final, last = demonstration.final, demonstration.keyframes[-1].action
-    if not last.gripper_open and EMPTY < final.gripper_opening < HELD:
-        problem = f"it ends with something in the closed hand (opening {final.gripper_opening:.2f})"
-        remedy = "end with the release and the retreat, unless holding it is the aim"
-        yield Finding("warning", f"{where}, final, gripper_opening", problem, remedy)
 
 
 def _agreement(observations: list[Observation], where: str) -> Iterator[Finding]:
