@@ -28,6 +28,9 @@ OPEN_CELL, FLAT = 0.0125, 0.004
 # A point of the plane whose colour differs by more is a mark on it, unless less than this share is plain.
 MARKED, PLAIN_SHARE = 0.15, 0.8
 
+# So few points are not thinned by a coarser grid, which has at least eight cells, but one by one.
+_CELLS = 2000
+
 # Points of a hand in the gripper's frame, and how near to them something is measured, metres.
 _HAND = np.array([(0.0, 0.0, z) for z in (-0.13, -0.11, -0.09, -0.07)])
 NEAR_HAND = 0.06
@@ -63,7 +66,7 @@ class Perception:
     Attributes:
         robot_mask: the self-filter; None leaves the robot in the cloud.
         voxel: edge of the grid, metres.
-        max_points: if there are more, the grid is made coarser.
+        max_points: if there are more, the grid is made coarser, and few are the farthest points.
         lower, upper: (3,) bounds of the workspace, metres.
         align_views: whether a policy corrects the cameras' poses where views disagree, see `view_alignment`;
             the cloud of an observation is made with the poses that the observation says.
@@ -97,11 +100,11 @@ class Perception:
         if not len(cloud):
             raise self._nothing(everything)
         voxel, thin = self.voxel, clouds.voxel_downsample(cloud, self.voxel)
-        while len(thin) > self.max_points:
+        while len(thin) > max(self.max_points, _CELLS):
             # A surface fills as many cells as the square of their edge goes into it.
-            voxel *= 1.02 * np.sqrt(len(thin) / self.max_points)
+            voxel *= 1.02 * np.sqrt(len(thin) / max(self.max_points, _CELLS))
             thin = clouds.voxel_downsample(cloud, voxel)
-        return thin
+        return thin.select(clouds.farthest_points(thin.points, self.max_points))
 
     def _nothing(self, everything: PointCloud) -> InvalidInput:
         low, high = np.percentile(everything.points, [5, 95], axis=0).round(2).tolist()
