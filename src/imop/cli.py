@@ -15,7 +15,7 @@ from tyro.conf import Positional
 
 from imop import cli_data
 from imop.calibration.command import calibrate
-from imop.errors import ImopError, InvalidInput, MissingExtra
+from imop.errors import ImopError, InvalidInput
 from imop.files import writable_folder
 from imop.reproduce.command import reproduce
 from imop.serving.command import serve
@@ -240,60 +240,7 @@ app.command(serve)
 app.command(name="import")(cli_data.import_)
 app.command(cli_data.export)
 app.command(cli_data.check)
-
-
-@app.command
-def predict(
-    demo: Path,
-    query: Path,
-    demo_episode: int = 0,
-    query_episode: int = 0,
-    base: tuple[float, float, float] | None = None,
-    robot: str = "panda",
-    method: str = "learned",
-    weights: Path | None = None,
-    out: Path = Path("runs/predict"),
-) -> int:
-    """Predict the action at every keyframe of a recorded episode from one demonstration; nothing moves.
-
-    Writes result.json and, with the extra viz, steps.png. Without the extra sim, poses that the Panda cannot
-    reach are not ruled out.
-
-    Args:
-        demo: store or folder of RLBench's layout with the demonstration.
-        query: store or folder with the recorded episode to predict.
-        demo_episode: number of the demonstration's episode.
-        query_episode: number of the episode to predict.
-        base: where the robot's base is in the recordings' frame, metres; by default as in the simulation,
-            with a table at a height of 0.752 m.
-        robot: whose points are left out and which poses are reached: panda, a set-up such as cell.toml, in
-            whose world the recordings are, or one's own, such as my_robot:MyArm.
-        method: learned, replay, registration, textbook, or one's own, such as my_methods:MyPolicy.
-        weights: folder that `imop train` wrote; by default the bundled weights.
-        out: folder for the results.
-    """
-    from imop.demos.frames import moved
-    from imop.demos.load import load_demonstration
-    from imop.evaluation.predict import draw_predictions, frame_of, predict_recorded, predictions_table
-
-    writable_folder(out)
-    if base is not None and robot.endswith((".toml", ".json")):
-        raise InvalidInput("base", f"{base} together with {robot}", "one of the two; a set-up has the base")
-    T_imop_world = frame_of(base)
-    shown, recorded = load_demonstration(demo, demo_episode), load_demonstration(query, query_episode)
-    shown, recorded = moved(shown, T_imop_world), moved(recorded, T_imop_world)
-    with status(f"predicting {query}"):
-        origin = {"demo": f"{demo}", "demo_episode": demo_episode, "query": f"{query}"}
-        origin |= {"query_episode": query_episode, "base": base, "robot": robot}
-        origin["weights"] = weights and f"{weights}"
-        predictions = predict_recorded(shown, recorded, method, out, weights, T_imop_world, robot, origin)
-        try:
-            draw_predictions(shown, recorded, predictions, out / "steps.png", robot)
-        except MissingExtra as error:
-            console.print(f"no steps.png: {error}")
-    console.print(predictions_table(predictions))
-    list_folder(out)
-    return 0
+app.command(cli_data.predict)
 
 
 @app.command

@@ -2,6 +2,7 @@ import pytest
 
 from imop.errors import InvalidInput
 from imop.evaluation import recordings as module
+from imop.evaluation import trials
 from imop.evaluation.recordings import Recordings, objects_world
 from imop.evaluation.trials import DEMONSTRATION_SEED, Trial
 from imop.files import user_cache
@@ -34,10 +35,10 @@ def test_scenes_are_recorded_once(tmp_path, monkeypatch):
 
 
 def test_other_code_records_again(tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "code_digest", lambda *packages: "old")
+    monkeypatch.setattr(trials, "code_digest", lambda *packages: "old")
     monkeypatch.setattr(module, "record_demonstration", lambda *_: fails())
     assert Recordings(tmp_path, POT.task).scene(POT) is None
-    monkeypatch.setattr(module, "code_digest", lambda *packages: "new")
+    monkeypatch.setattr(trials, "code_digest", lambda *packages: "new")
     monkeypatch.setattr(module, "record_demonstration", never)
     with pytest.raises(AssertionError):
         Recordings(tmp_path, POT.task).scene(POT)

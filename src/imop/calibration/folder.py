@@ -28,6 +28,7 @@ from imop.errors import CorruptData, InvalidInput
 from imop.files import read, replaced
 from imop.geometry import se3
 from imop.robots.interfaces import RobotState
+from imop.setup.file import intrinsics_fields, pose_fields
 from imop.types import (
     ByteArray,
     CameraView,
@@ -233,11 +234,10 @@ def _camera(fields: Mapping[str, Any]) -> RigCamera:
 
 def _camera_fields(camera: RigCamera) -> dict[str, Any]:
     K = camera.intrinsics
-    intrinsics = None if K is None else {"fx": K[0, 0], "fy": K[1, 1], "cx": K[0, 2], "cy": K[1, 2]}
     return {
         "mount": camera.mount,
         "size": [camera.width, camera.height],
-        "intrinsics": intrinsics,
+        "intrinsics": None if K is None else intrinsics_fields(K),
         "distortion": camera.distortion.tolist(),
     }
 
@@ -275,9 +275,8 @@ def _pose(fields: Mapping[str, Any] | Sequence[Sequence[float]]) -> FloatArray:
 
 
 def _shot_fields(shot: Recorded) -> dict[str, Any]:
-    pose = se3.to_pose7(shot.T_base_gripper)
     fields: dict[str, Any] = {
-        "T_base_gripper": {"position": pose[:3].tolist(), "quaternion": pose[3:].tolist()},
+        "T_base_gripper": pose_fields(shot.T_base_gripper),
         "gripper_opening": shot.gripper_opening,
         "images": dict(shot.images),
         "depth": dict(shot.depth),

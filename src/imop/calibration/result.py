@@ -15,6 +15,7 @@ from imop.calibration.series import BoardPlace, Mount, RigCamera
 from imop.errors import CorruptData, ImopError
 from imop.files import read, replaced
 from imop.geometry import se3
+from imop.setup.file import intrinsics_fields, pose_fields
 from imop.types import FloatArray
 
 FORMAT = "imop-calibration"
@@ -109,10 +110,10 @@ def save_calibration(calibration: Calibration, path: Path) -> None:
         "version": 1,
         "cameras": {name: _camera_fields(calibration, name) for name in calibration.cameras},
         "distortion": {name: c.camera.distortion.tolist() for name, c in calibration.cameras.items()},
-        "T_world_base": _pose_fields(calibration.T_world_base),
+        "T_world_base": pose_fields(calibration.T_world_base),
         "board": asdict(calibration.board),
         "board_on": calibration.board_on,
-        "T_place_board": _pose_fields(calibration.T_place_board),
+        "T_place_board": pose_fields(calibration.T_place_board),
         "quality": {name: asdict(found.quality) for name, found in calibration.cameras.items()},
         "problems": [asdict(problem) for problem in calibration.problems],
     }
@@ -149,11 +150,6 @@ def load_calibration(path: Path) -> Calibration:
         raise CorruptData(path, f"not a calibration ({type(error).__name__}: {error})", _REMEDY) from error
 
 
-def _pose_fields(T: FloatArray) -> dict[str, list[float]]:
-    pose = se3.to_pose7(T)
-    return {"position": pose[:3].tolist(), "quaternion": pose[3:].tolist()}
-
-
 def pose_of(fields: Mapping[str, Any]) -> FloatArray:
     """The pose (4, 4) of fields position (metres) and quaternion (x y z w)."""
     return se3.from_pose7(np.array([*fields["position"], *fields["quaternion"]], dtype=np.float64))
@@ -166,9 +162,9 @@ def _camera_fields(calibration: Calibration, name: str) -> dict[str, Any]:
     on_hand = camera.mount == "hand"
     T = found.T_mount_camera if on_hand else calibration.T_world_base @ found.T_mount_camera
     return {
-        "intrinsics": {"fx": K[0, 0], "fy": K[1, 1], "cx": K[0, 2], "cy": K[1, 2]},
+        "intrinsics": intrinsics_fields(K),
         "size": [camera.width, camera.height],
-        "T_gripper_camera" if on_hand else "T_world_camera": _pose_fields(T),
+        "T_gripper_camera" if on_hand else "T_world_camera": pose_fields(T),
     }
 
 

@@ -18,7 +18,7 @@ from imop.cameras.interfaces import Frame
 from imop.errors import InvalidInput
 from imop.extras import extra
 from imop.geometry import se3
-from imop.robots.interfaces import DONE, MotionResult, RobotState
+from imop.robots.interfaces import DONE, MotionResult
 from imop.robots.panda import PANDA_HOME_Q, T_WORLD_BASE
 from imop.types import ByteArray, CameraView, FloatArray, as_fraction, as_pose
 
@@ -26,6 +26,7 @@ with extra("sim"):
     from imop.sim.cameras import Camera as RayCamera
     from imop.sim.cameras import camera_view
     from imop.sim.depth_noise import DepthNoise
+    from imop.sim.driver import SimulatedRobot
     from imop.sim.kinematics import inverse_kinematics
     from imop.sim.world import World, scene_spec
 
@@ -42,17 +43,8 @@ Kind = Literal["beside", "hand"]
 """Two cameras beside the robot, or one on its hand."""
 
 
-class PlacedArm:
+class PlacedArm(SimulatedRobot):
     """A `Robot` that is put where it should go, at once."""
-
-    def __init__(self, world: World):
-        self._world = world
-
-    def state(self) -> RobotState:
-        """What the arm measures now."""
-        world = self._world
-        T = se3.invert(T_WORLD_BASE) @ world.T_world_gripper
-        return RobotState(T, world.gripper_opening, world.robot_q, world.time)
 
     def move_to(
         self, T_base_gripper: FloatArray, *, straight: bool = False, allow_collisions: bool = False
@@ -62,19 +54,12 @@ class PlacedArm:
         found = inverse_kinematics(T, PANDA_HOME_Q, 1)
         if not len(found):
             return MotionResult(False, "unreachable", "no joint positions put the gripper there")
-        self._world.set_robot(found[0], self._world.gripper_opening)
+        self.world.set_robot(found[0], self.world.gripper_opening)
         return DONE
 
     def move_gripper(self, opening: float) -> MotionResult:
         """Put the fingers at an opening, 0 closed .. 1 open."""
-        self._world.set_robot(self._world.robot_q, as_fraction("opening", opening))
-        return DONE
-
-    def stop(self) -> None:
-        """Nothing moves."""
-
-    def recover(self) -> MotionResult:
-        """There are no errors."""
+        self.world.set_robot(self.world.robot_q, as_fraction("opening", opening))
         return DONE
 
 

@@ -7,19 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-import imop.robots
-import imop.sim
-import imop.tasks
 from imop.demos.store import DemonstrationStore
 from imop.errors import InvalidInput
-from imop.evaluation.fingerprint import code_digest, own_code_digest
-from imop.evaluation.trials import DEMONSTRATION_SEED, Trial, demonstration_for
+from imop.evaluation.trials import DEMONSTRATION_SEED, Trial, demonstration_for, expert_state
 from imop.files import replaced
 from imop.sim.world import World, scene_spec
 from imop.tasks.env import make_task
 from imop.tasks.expert import ExpertFailed, record_demonstration
 from imop.tasks.layout import NoRoom
-from imop.tasks.suites import find_task
 from imop.types import Demonstration
 
 
@@ -34,8 +29,7 @@ class Recordings:
     """
 
     def __init__(self, folder: Path, task: str):
-        state = [code_digest(imop.sim, imop.robots, imop.tasks), *own_code_digest(find_task(task))]
-        path = folder / "-".join(["recordings", *state])
+        path = folder / "-".join(["recordings", *expert_state(task)])
         self._failed = path / "failed"
         try:
             self._store = DemonstrationStore.open(path / "demos.zarr")

@@ -9,13 +9,13 @@ from imop import plugins
 from imop.errors import InvalidInput, MissingExtra
 from imop.geometry import se3
 from imop.geometry.perception import Perception, RobotMask
+from imop.robots import ARMS
 from imop.robots.panda import T_WORLD_BASE, panda_self_filter
 from imop.setup.arm import arm_of
 from imop.setup.file import load_setup
 from imop.types import BoolArray, FloatArray
 
-PANDA = "panda"
-SIMULATED = ("iiwa14", "ur5e")
+PANDA, *SIMULATED = ARMS
 _OWN = (
     "a class or function that makes, called without arguments, an object with is_robot and reachable, named "
     "module:object or by an entry point imop.robots"
@@ -93,11 +93,7 @@ def _simulated(name: str) -> tuple[RobotMask, Reachable]:
     from imop.sim.arms import find_arm, self_filter
 
     arm = find_arm(name)
-
-    def reachable(T_world_gripper: FloatArray) -> bool:
-        return len(arm.kinematics.inverse(T_world_gripper, arm.home, 1)) > 0
-
-    return self_filter(arm).is_robot, reachable
+    return self_filter(arm).is_robot, arm.reachable
 
 
 def _panda_reachable() -> Reachable | None:

@@ -152,11 +152,15 @@ def demonstrations_for(trial: Trial, kept: Path | None = None) -> list[Demonstra
 
 
 def _demonstration(trial: Trial, first_seed: int, instance: int, kept: Path | None) -> Demonstration:
-    code = [code_digest(imop.sim, imop.robots, imop.tasks), *own_code_digest(find_task(trial.task))]
     recorded = Memory(kept, verbose=0, compress=1).cache(_recorded)
     variation = trial.demonstrated.variation
-    asked = code, trial.task, variation, instance, first_seed, trial.robot
+    asked = expert_state(trial.task), trial.task, variation, instance, first_seed, trial.robot
     return _seen(recorded(*asked), trial.changed.shown)
+
+
+def expert_state(task: str) -> list[str]:
+    """Digests of the code that decides what the expert does in a task, and what is seen of it."""
+    return [code_digest(imop.sim, imop.robots, imop.tasks), *own_code_digest(find_task(task))]
 
 
 def _recorded(

@@ -100,9 +100,10 @@ class Perception:
         if not len(cloud):
             raise self._nothing(everything)
         voxel, thin = self.voxel, clouds.voxel_downsample(cloud, self.voxel)
-        while len(thin) > max(self.max_points, _CELLS):
+        most = max(self.max_points, _CELLS)
+        while len(thin) > most:
             # A surface fills as many cells as the square of their edge goes into it.
-            voxel *= 1.02 * np.sqrt(len(thin) / max(self.max_points, _CELLS))
+            voxel *= 1.02 * np.sqrt(len(thin) / most)
             thin = clouds.voxel_downsample(cloud, voxel)
         return thin.select(clouds.farthest_points(thin.points, self.max_points))
 

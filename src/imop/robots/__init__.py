@@ -1,1 +1,4 @@
 """Robots without a simulator: where their parts are at the measured joints, and which points are theirs."""
+
+ARMS = ("panda", "iiwa14", "ur5e")
+"""Names of the arms that imop knows without a model file of one's own; the first needs no extra."""

@@ -41,8 +41,7 @@ class SetupArm:
 
     def perception(self, setup: Setup, **options: Any) -> Perception:
         """What makes clouds of this set-up's observations; for `options` see `Perception`."""
-        lower, upper = (tuple(p.tolist()) for p in (setup.workspace.lower, setup.workspace.upper))
-        return Perception(self.self_filter.is_robot, lower=lower, upper=upper, **options)
+        return setup.workspace.perception(self.self_filter.is_robot, **options)
 
 
 def arm_of(setup: Setup) -> SetupArm:

@@ -8,7 +8,7 @@ from imop.demos.findings import Finding
 from imop.errors import ImopError, InvalidInput
 from imop.geometry import se3
 from imop.geometry.cloud import crop, fuse
-from imop.geometry.perception import Perception, supporting_plane, views_of_hand, with_normals
+from imop.geometry.perception import supporting_plane, views_of_hand
 from imop.setup.arm import SetupArm, arm_of
 from imop.setup.setup import CameraSetup, Setup
 from imop.types import FloatArray, Observation
@@ -144,9 +144,8 @@ def _seen(setup: Setup, arm: SetupArm | None, seen: Observation) -> Iterator[Fin
     if lacking:
         remedy = "record with all cameras, or give seen_as, by which the recording calls one"
         yield Finding("error", "cameras", f"the observation has no {', '.join(sorted(lacking))}", remedy)
-    lower, upper = (tuple(p.tolist()) for p in (setup.workspace.lower, setup.workspace.upper))
     try:
-        cloud = with_normals(Perception(None, lower=lower, upper=upper).points(seen), seen)
+        cloud = setup.workspace.perception(None)(seen)
     except InvalidInput as error:
         yield Finding.of(error, "observation")
         return

@@ -86,7 +86,7 @@ def to_dict(setup: Setup) -> dict[str, Any]:
         "robot": {
             "model": robot.model,
             "home": robot.home.tolist(),
-            "T_world_base": _plain_pose(robot.T_world_base),
+            "T_world_base": pose_fields(robot.T_world_base),
         }
     }
     if robot.joints:
@@ -110,7 +110,7 @@ def to_dict(setup: Setup) -> dict[str, Any]:
     fields["cameras"] = {name: _plain_camera(camera) for name, camera in setup.cameras.items()}
     if setup.parts:
         fields["parts"] = {
-            name: {"size": part.size.tolist(), "T_gripper_part": _plain_pose(part.T_gripper_part)}
+            name: {"size": part.size.tolist(), "T_gripper_part": pose_fields(part.T_gripper_part)}
             for name, part in setup.parts.items()
         }
     return fields
@@ -263,21 +263,25 @@ def _intrinsics(value: Any) -> FloatArray:
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
 
 
-def _plain_pose(T_a_b: FloatArray) -> dict[str, Any]:
+def pose_fields(T_a_b: FloatArray) -> dict[str, list[float]]:
+    """A pose (4, 4) as files have it: position, metres, and quaternion, x y z w."""
     pose = se3.to_pose7(T_a_b)
     return {"position": pose[:3].tolist(), "quaternion": pose[3:].tolist()}
 
 
+def intrinsics_fields(K: FloatArray) -> dict[str, float]:
+    """(3, 3) as files have it: fx, fy, cx, cy, pixels."""
+    return {"fx": float(K[0, 0]), "fy": float(K[1, 1]), "cx": float(K[0, 2]), "cy": float(K[1, 2])}
+
+
 def _plain_camera(camera: CameraSetup) -> dict[str, Any]:
-    K = camera.intrinsics
     fields: dict[str, Any] = {
         "size": list(camera.size),
-        "intrinsics": {"fx": K[0, 0], "fy": K[1, 1], "cx": K[0, 2], "cy": K[1, 2]},
+        "intrinsics": intrinsics_fields(camera.intrinsics),
     }
-    fields["intrinsics"] = {name: float(value) for name, value in fields["intrinsics"].items()}
     for name in ("T_world_camera", "T_gripper_camera"):
         if getattr(camera, name) is not None:
-            fields[name] = _plain_pose(getattr(camera, name))
+            fields[name] = pose_fields(getattr(camera, name))
     return fields | ({"seen_as": camera.seen_as} if camera.seen_as else {})
 
 

@@ -6,18 +6,18 @@ check take what they need from here.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from imop.cameras.interfaces import Frame
 from imop.errors import InvalidInput
 from imop.geometry import se3
+from imop.geometry.perception import Perception, RobotMask
+from imop.robots import ARMS
 from imop.robots.interfaces import RobotState
 from imop.setup.units import as_angles, as_box, as_direction, as_length, as_place, as_positive
 from imop.types import FloatArray, Observation, as_array, as_intrinsics, freeze
-
-KNOWN_MODELS = ("panda", "iiwa14", "ur5e")
-"""Arms that need no file; the last two need the extra arms."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class RobotSetup:
     """The arm.
 
     Attributes:
-        model: one of `KNOWN_MODELS`, or the path of an MJCF (.xml) or URDF (.urdf) file; a path is relative
+        model: one of `robots.ARMS`, or the path of an MJCF (.xml) or URDF (.urdf) file; a path is relative
             to the set-up file.
         home: (J,) radians, where an episode begins; J is the number of joints everywhere else.
         T_world_base: (4, 4), where the model's base stands.
@@ -46,7 +46,7 @@ class RobotSetup:
             joints=tuple(self.joints),
         )
         if not self.model:
-            raise InvalidInput("robot.model", "empty", f"a file, or one of {', '.join(KNOWN_MODELS)}")
+            raise InvalidInput("robot.model", "empty", f"a file, or one of {', '.join(ARMS)}")
         if self.known and self.joints:
             accepted = f"no names, for imop knows those of {self.model}"
             raise InvalidInput("robot.joints", ", ".join(self.joints), accepted)
@@ -56,8 +56,8 @@ class RobotSetup:
 
     @property
     def known(self) -> bool:
-        """Whether the model is one of `KNOWN_MODELS`."""
-        return self.model in KNOWN_MODELS
+        """Whether the model is one of `robots.ARMS`."""
+        return self.model in ARMS
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +129,11 @@ class WorkspaceSetup:
             accepted = f"between the z of lower and of upper, {lower[2]:g} and {upper[2]:g} m"
             raise InvalidInput("workspace.table_height", f"{height:g} m", accepted)
         freeze(self, lower=lower, upper=upper, table_height=height)
+
+    def perception(self, robot_mask: RobotMask | None, **options: Any) -> Perception:
+        """What makes clouds of what is in it; for `options` see `Perception`."""
+        lower, upper = (tuple(p.tolist()) for p in (self.lower, self.upper))
+        return Perception(robot_mask, lower=lower, upper=upper, **options)
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +230,7 @@ class Setup:
 
     Attributes:
         robot, workspace, limits: see there.
-        gripper: None if the robot's model is one of `KNOWN_MODELS`, which imop knows with their gripper.
+        gripper: None if the robot's model is one of `robots.ARMS`, which imop knows with their gripper.
         cameras: by the names that their drivers have.
         parts: what is mounted on the gripper, by name.
 

@@ -10,6 +10,7 @@ import numpy as np
 from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.geometry.self_filter import SelfFilter
+from imop.robots import ARMS
 from imop.robots.panda import (
     FILTER_MARGIN,
     JOINT_LOWER,
@@ -71,6 +72,10 @@ class Arm:
     kinematics: Kinematics
     spec: Callable[[], Any]
 
+    def reachable(self, T_world_gripper: FloatArray) -> bool:
+        """Whether the gripper can be taken to a pose (4, 4), collisions aside."""
+        return len(self.kinematics.inverse(T_world_gripper, self.home, 1)) > 0
+
 
 PANDA = Arm(
     "panda",
@@ -83,7 +88,6 @@ PANDA = Arm(
     PandaKinematics(),
     panda_spec,
 )
-ARMS = ("panda", "iiwa14", "ur5e")
 
 
 @cache
