@@ -44,7 +44,7 @@ test-lowest: install
 		hypothesis pytest pytest-xdist
 	build/lowest/bin/python -m pytest -n 2 --dist worksteal tests/demos tests/geometry tests/networks tests/policy \
 		tests/robots tests/calibration tests/sim tests/evaluation tests/tasks/coppelia tests/tasks/test_env.py tests/test_cli.py \
-		tests/training/test_loop.py tests/training/test_ablation.py tests/training/test_routes.py
+		tests/training/loop tests/training/test_ablation.py tests/training/synthetic/test_routes.py
 
 # Rewrites constraints.txt from what is installed now.
 lock: install

@@ -41,11 +41,11 @@ from imop.networks.model import BUNDLED, load_model
 from imop.policy.interfaces import BEGINNING, Candidate, Matcher, Progress, Scene
 from imop.policy.learned import LearnedMatcher
 from imop.policy.registration import RegistrationMatcher
-from imop.training.families import HELD_OUT, TRAINING
-from imop.training.plans import check_kinds
-from imop.training.set_up import SetUp
-from imop.training.synthetic import SAME_ONLY, synthetic_executions
-from imop.training.takes import Example
+from imop.training.synthetic.families import HELD_OUT, TRAINING
+from imop.training.synthetic.pairs import SAME_ONLY, synthetic_executions
+from imop.training.synthetic.plans import check_kinds
+from imop.training.synthetic.takes import SyntheticStep
+from imop.training.verification.set_up import SetUp
 from imop.types import FloatArray, Observation
 
 PER_JOB = 10
@@ -122,7 +122,7 @@ def make_matcher(method: str, weights: Path) -> Matcher:
     return LearnedMatcher(load_model(weights))
 
 
-def drawn(options: Options, number: int) -> Iterator[tuple[list[Example], Observation | None]]:
+def drawn(options: Options, number: int) -> Iterator[tuple[list[SyntheticStep], Observation | None]]:
     """The executions of one job, without end; see `synthetic_executions`."""
     content = int(np.random.SeedSequence([options.seed, number]).generate_state(1)[0])
     families = HELD_OUT if options.families == "held_out" else TRAINING
@@ -150,7 +150,7 @@ def job(options: Options, number: int) -> list[Row]:
 
 
 def predict(
-    method: str, matcher: Matcher, scene: str, group: Sequence[Example], elsewhere: Observation | None
+    method: str, matcher: Matcher, scene: str, group: Sequence[SyntheticStep], elsewhere: Observation | None
 ) -> Iterator[Row]:
     """The rows of one method for one demonstration and one query, and where its things are not, if given."""
     set_up, progress = SetUp(), BEGINNING
@@ -175,7 +175,7 @@ def sure(found: Sequence[Candidate]) -> float:
     return found[0].probability if found else 0.0
 
 
-def off(found: Sequence[Candidate], example: Example) -> tuple[float | None, float | None]:
+def off(found: Sequence[Candidate], example: SyntheticStep) -> tuple[float | None, float | None]:
     """Metres and degrees from the answer to the nearest right pose."""
     if not found:
         return None, None
@@ -185,7 +185,7 @@ def off(found: Sequence[Candidate], example: Example) -> tuple[float | None, flo
     return float(position), float(np.degrees(rotation))
 
 
-def iou(before: Scene, region: FloatArray, example: Example) -> float:
+def iou(before: Scene, region: FloatArray, example: SyntheticStep) -> float:
     """Of the region that was found and the true one, over the points that were seen."""
     points = before.cloud.points
     owner = nearest(points, example.pair.support.points)[1][:, 0]

@@ -28,7 +28,7 @@ from imop.evaluation.statistics import wilson
 from imop.extras import extra
 from imop.files import read, replaced
 from imop.geometry.accuracy import COARSE
-from imop.training.verification import calibration_error, equal_bins
+from imop.training.verification.fit import calibration_error, equal_bins
 
 with extra("viz"):
     from matplotlib.axes import Axes

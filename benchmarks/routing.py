@@ -5,7 +5,7 @@ which the expected step is right (also with the gripper a little elsewhere: `mov
 (a failed grasp, a thing that fell, a joint that moved part of its way, ...). It knows what came before, as in
 an episode. The shards hold more mishaps than a rollout: `all` weighs them with `--share`.
 
-    python -m imop.training.generate --out DIR --routes 200 --seed 77 --held-out
+    imop training generate --out DIR --routes 200 --seed 77 --held-out
     python benchmarks/routing.py --routes DIR --weights PATH --json FILE
 """
 
@@ -26,9 +26,9 @@ from imop.evaluation.report import console_for_tables
 from imop.evaluation.statistics import wilson
 from imop.networks.model import BUNDLED, Model, load_model
 from imop.policy.router import Odds, prior
-from imop.training.route_batch import make_route_sample
-from imop.training.route_shards import RouteShard
-from imop.training.routes import Route
+from imop.training.data.route_batch import make_route_sample
+from imop.training.data.route_shards import RouteShard
+from imop.training.data.route import Route
 
 
 @dataclass

@@ -19,7 +19,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from imop.training.generate import generate
+from imop.training.synthetic.generate import GenerateConfig, generate
 
 LIMIT = 4.0
 """What issue 4 asks for: pairs per second for `small` on two cores."""
@@ -58,7 +58,7 @@ def reference(seconds: float = 2.0, size: int = 1024) -> float:
 def making(folder: Path, pairs: int) -> float:
     """Pairs per second and core."""
     start = time.perf_counter()
-    generate(folder, pairs, seed=0, jobs=1)
+    generate(GenerateConfig(folder, pairs))
     return pairs / (time.perf_counter() - start)
 
 
@@ -70,7 +70,7 @@ def training(shards: Path, arguments: Arguments) -> float:
         with tempfile.TemporaryDirectory() as out:
             asked = {"steps": steps, "batch": arguments.batch, "workers": arguments.workers}
             options = [text for name, value in asked.items() for text in (f"--{name}", str(value))]
-            loop = ["-m", "imop.training.loop", "--out", out, "--train", str(shards), *options]
+            loop = ["-m", "imop.training.loop.train", "--out", out, "--train", str(shards), *options]
             start = time.perf_counter()
             subprocess.run([sys.executable, *together, *loop], check=True, capture_output=True)
             seconds.append(time.perf_counter() - start)

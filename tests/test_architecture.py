@@ -1,6 +1,7 @@
 """Arrows point one way: types <- geometry <- demos <- networks <- policy <- the rest."""
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -45,6 +46,17 @@ ALLOWED["reproduce"] = ALLOWED["evaluation"] | {"evaluation", "terminal"}
 ALLOWED["viewing"] = ALLOWED["reproduce"] | {"cameras", "setup"}
 ALLOWED["serving"] = BASE | {"geometry", "demos", "policy", "evaluation", "terminal"}
 
+COMMANDS = ("cli", "cli_baselines", "cli_data", "cli_training")
+TRAINING = {
+    "data": set(),
+    "loop": {"data"},
+    "recorded": {"data"},
+    "synthetic": {"data"},
+    "verification": {"data", "recorded", "synthetic"},
+    "recipes": {"data"},
+}
+"""Packages of `training`, and which others they know; all may read its configurations."""
+
 
 def imports(path):
     for node in ast.walk(ast.parse(path.read_text())):
@@ -59,16 +71,22 @@ def imports(path):
 @pytest.mark.parametrize("path", sorted(SOURCE.rglob("*.py")), ids=lambda p: str(p.relative_to(SOURCE)))
 def test_imports_follow_the_arrows(path):
     package = path.relative_to(SOURCE).parts[0].removesuffix(".py")
-    if package in ("__init__", "cli", "cli_data"):
+    if package in ("__init__", *COMMANDS):
         return
     forbidden = set(imports(path)) - ALLOWED[package] - {package}
     assert not forbidden, f"{path} imports {forbidden}"
 
 
 def test_nobody_imports_the_command_line():
-    assert not [
-        p for p in SOURCE.rglob("*.py") if {"cli", "cli_data"} & set(imports(p)) and p.name != "cli.py"
-    ]
+    assert not [p for p in SOURCE.rglob("*.py") if set(COMMANDS) & set(imports(p)) and p.name != "cli.py"]
+
+
+@pytest.mark.parametrize("package", TRAINING)
+def test_the_parts_of_the_training_know_few_others(package):
+    used = set()
+    for path in (SOURCE / "training" / package).rglob("*.py"):
+        used |= set(re.findall(r"imop\.training\.(\w+)", path.read_text()))
+    assert used <= TRAINING[package] | {package, "ablation", "config"}
 
 
 @pytest.mark.parametrize("package", ["policy", "networks"])

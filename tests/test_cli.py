@@ -13,9 +13,9 @@ from imop.geometry import se3
 from imop.networks.model import load_model
 from imop.robots.panda import T_WORLD_BASE
 from imop.tasks.disturbances import DISTURBANCES
-from imop.training.shards import write_shard
+from imop.training.data.shards import write_shard
 from imop.viewing.cases import from_result
-from tests.training.test_pairs import pair
+from tests.training.data.test_pairs import pair
 
 VERBS = (
     "check-task",

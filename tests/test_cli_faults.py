@@ -7,11 +7,11 @@ import pytest
 
 from imop.cli import main
 from imop.demos.store import DemonstrationStore
-from imop.training.shards import write_shard
+from imop.training.data.shards import write_shard
 from tests.demos.rlbench_files import write_episode
 from tests.demos.scenes import lift_a_cube
 from tests.tasks.coppelia.conftest import cupboard
-from tests.training.test_pairs import pair
+from tests.training.data.test_pairs import pair
 
 POT = "tabletop/lid_off_pot"
 LID = ("--tasks", "lid_off_pot")

@@ -87,7 +87,7 @@ def test_the_base_is_all_that_a_policy_needs(base_only, package):
         ("imop.training.config", "-"),
         ("imop.setup.arm", "-"),
         ("imop.setup.picture", "viz"),
-        ("imop.training.stage", "sim"),
+        ("imop.training.synthetic.stage", "sim"),
         ("imop.viewing.cases", "-"),
         ("imop.viewing.draw", "-"),
         ("imop.viewing.simulated", "sim"),

@@ -5,6 +5,8 @@ Exit codes: 0 done, 1 the task failed or the data have errors, 2 bad input or a 
 
 import os
 import sys
+from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -23,12 +25,17 @@ from imop.setup.command import setup
 from imop.terminal import console, list_folder, status
 from imop.training.ablation import Ablation
 from imop.training.config import TrainConfig
-from imop.training.recipe import RecipeName, make, refuse_others
+from imop.training.recipes.recipe import RecipeName, make, refuse_others
 from imop.viewing.command import view
 
 # Verbs import what they need when they run, so that --help does not wait for torch and MuJoCo.
 
 app = tyro.extras.SubcommandApp()
+GROUPS = {
+    "training": "Make what networks are trained on, train the verification, merge weights, draw regions.",
+    "baselines": "Train the regressors that the policy is compared with.",
+}
+"""Commands that have commands of their own, in `cli_NAME.py`, which is read when one is called."""
 Disturb = Literal["", "moved", "knocked", "missed", "shut"]
 
 
@@ -300,7 +307,7 @@ def train(
 ) -> int:
     """Train networks on shards; run again with the same arguments, it continues where it was stopped.
 
-    Shards are written by `python -m imop.training.generate` and its neighbours, see docs/training.md. Under
+    Shards are written by `imop training generate` and its neighbours, see docs/training.md. Under
     torchrun it trains on several processes or machines. A recipe makes everything from the shards on.
 
     Args:
@@ -312,7 +319,7 @@ def train(
         jobs: processes of a recipe; 2 if not given.
     """
     from imop.networks.model import PAPER, SMALL
-    from imop.training.loop import train as run_training
+    from imop.training.loop.train import train as run_training
 
     if recipe is not None:
         refuse_others(config, ablation, size)
@@ -349,9 +356,25 @@ def model(config: Literal["small", "paper"] = "small", weights: Path | None = No
     return 0
 
 
+def _elsewhere() -> int:
+    """Stands for a group in the help of all commands."""
+    raise NotImplementedError
+
+
+for _name, _help in GROUPS.items():
+    app.command(name=_name, help=_help)(_elsewhere)
+
+
+def _read_group(arguments: Sequence[str]) -> None:
+    if arguments and arguments[0] in GROUPS:
+        group = import_module(f"imop.cli_{arguments[0]}").app
+        app.command(group, name=arguments[0], help=GROUPS[arguments[0]])
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Entry point of `imop`."""
     try:
+        _read_group(sys.argv[1:] if arguments is None else arguments)
         code = app.cli(prog="imop", description=__doc__, args=arguments)
     except ImopError as error:
         code = _fail(str(error))

@@ -5,7 +5,7 @@ from imop.demos.store import DemonstrationStore
 from imop.errors import InvalidInput
 from imop.evaluation.regions import draw, region_panels
 from imop.geometry import se3
-from tests.training.test_recorded import demonstration
+from tests.training.recorded.test_write import demonstration
 
 
 def test_every_step_shows_its_region_and_pairs_that_moved_with_the_action():

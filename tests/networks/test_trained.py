@@ -12,9 +12,9 @@ from imop.networks.backbone import BackboneConfig
 from imop.networks.graph import GraphConfig
 from imop.networks.matching import MatchingConfig, MatchingNetwork, reposition
 from imop.networks.region import REGION_INPUTS, RegionConfig, RegionNetwork
-from imop.training import losses
-from imop.training.augment import augment
-from imop.training.pairs import StepPair, collate_samples, make_sample
+from imop.training.data.augment import augment
+from imop.training.data.pairs import StepPair, collate_samples, make_sample
+from imop.training.loop import losses
 from tests.networks.scenes import box_surface, moved, tabletop
 from tests.networks.test_networks import GOAL, NOW, permuted, turned
 

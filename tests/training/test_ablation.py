@@ -11,10 +11,10 @@ from imop.networks.region import REGION_INPUTS, RegionConfig
 from imop.networks.routing import INPUTS, RoutingConfig
 from imop.training.ablation import Ablation
 from imop.training.config import TrainConfig
-from imop.training.loop import CHECKPOINT, train
-from imop.training.metrics import validate
-from imop.training.shards import write_shard
-from tests.training.test_pairs import pair
+from imop.training.data.shards import write_shard
+from imop.training.loop.metrics import validate
+from imop.training.loop.train import CHECKPOINT, train
+from tests.training.data.test_pairs import pair
 
 
 def backbone(inputs=POINT_FEATURES):

@@ -1,6 +1,6 @@
 """Fine-tuning on one demonstration of a novel task, of all weights (RVT+FT) or of adapters alone (RVT+HDT).
 
-python -m imop.baselines.adapt --weights runs/baselines/views --stores novel.zarr --out runs/tuned/views
+imop baselines adapt --weights runs/baselines/views --stores novel.zarr --out runs/tuned/views
 
 fine-tunes all weights on the demonstrations of stores together, as the paper does it, to see what that does
 to the base tasks: `imop eval --methods rvt --baselines runs/tuned` asks the new weights.
@@ -8,14 +8,12 @@ to the base tasks: `imop eval --methods rvt --baselines runs/tuned` asks the new
 
 import shlex
 import sys
-from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
-import tyro
 from rich.console import Console
 from torch import Tensor, nn
 
@@ -25,7 +23,7 @@ from imop.baselines.samples import Samples
 from imop.baselines.train import descend, read_stores
 from imop.baselines.views import ViewsNetwork
 from imop.baselines.weights import fast_products, load_network, save_network
-from imop.errors import ImopError, InvalidInput
+from imop.errors import InvalidInput
 from imop.networks.descent import schedule
 
 
@@ -149,22 +147,9 @@ def adapt(fold: Fold, console: Console) -> None:
             **asdict(config),
             "before": measure(network, samples, everything, 128),
             "after": measure(tuned, samples, everything, 128),
-            "command": shlex.join(["python", "-m", "imop.baselines.adapt", *sys.argv[1:]]),
+            "command": shlex.join(["imop", *sys.argv[1:]]),
         },
         "instructions": sorted({*card["instructions"], *samples.instructions}),
     }
     save_network(tuned, fold.out, card)
     console.print(f"{fold.out}: place error {card['fine_tuned']['after']['place'] * 1000:.0f} mm")
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Command line of the fine-tuning."""
-    fold = tyro.cli(Fold, description=__doc__, args=arguments)
-    try:
-        adapt(fold, Console(highlight=False))
-    except ImopError as error:
-        sys.exit(f"error: {error}")
-
-
-if __name__ == "__main__":
-    main()

@@ -5,7 +5,7 @@ from the actions there, the hyper-network makes the weights of a bottleneck behi
 2023, arXiv 2304.08487). It is trained on base tasks: adapters from one demonstration shall help in others of
 the same task.
 
-python -m imop.baselines.hyper --weights runs/baselines/views --stores A.zarr --out runs/baselines/views_hdt
+imop baselines hyper --weights runs/baselines/views --stores A.zarr --out runs/baselines/views_hdt
 """
 
 import json
@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 import torch
-import tyro
 from numpy.typing import NDArray
 from rich.console import Console
 from torch import Tensor, nn
@@ -28,10 +27,10 @@ from torch.nn import functional as F
 
 from imop.baselines.batch import Targets, batch_of
 from imop.baselines.samples import Samples
-from imop.baselines.train import descend, read_stores
+from imop.baselines.train import descend
 from imop.baselines.views import ViewsNetwork
 from imop.baselines.weights import fast_products, load_network, read_weights, save_weights
-from imop.errors import CorruptData, ImopError
+from imop.errors import CorruptData
 from imop.files import replaced, writable_folder
 from imop.networks.descent import schedule
 
@@ -221,7 +220,7 @@ def load_hyper_network(folder: Path, network: ViewsNetwork, backbone: str) -> Hy
         CorruptData: if it is damaged, or was trained for other weights.
     """
     views = folder.parent / "views"
-    command = f"python -m imop.baselines.hyper --weights {views} --stores STORE ... --out {folder}"
+    command = f"imop baselines hyper --weights {views} --stores STORE ... --out {folder}"
     weights, card = read_weights(folder, command)
     if card.get("backbone") != backbone:
         raise CorruptData(folder, "was trained for other weights of the network", f"train again: {command}")
@@ -231,17 +230,3 @@ def load_hyper_network(folder: Path, network: ViewsNetwork, backbone: str) -> Hy
     except RuntimeError as error:
         raise CorruptData(folder, f"does not fit the network ({error})", f"train again: {command}") from error
     return hyper.eval()
-
-
-def main() -> None:
-    """Command line of the training of the hyper-network."""
-    config = tyro.cli(HyperConfig, description=__doc__)
-    console = Console(highlight=False)
-    try:
-        train_hyper(config, read_stores(config.stores, config.cache, console), console)
-    except ImopError as error:
-        sys.exit(f"error: {error}")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,6 +1,6 @@
 """Training of a regressor on recorded demonstrations, stopped and resumed at any step without a trace.
 
-python -m imop.baselines.train --network views --stores rlbench.zarr tabletop.zarr --out runs/baselines/views
+imop baselines train --network views --stores rlbench.zarr tabletop.zarr --out runs/baselines/views
 """
 
 import json
@@ -14,7 +14,6 @@ from typing import Any, Literal
 
 import numpy as np
 import torch
-import tyro
 from numpy.typing import NDArray
 from rich.console import Console
 from torch import Tensor, nn
@@ -23,7 +22,7 @@ from imop.baselines.batch import batch_of
 from imop.baselines.measure import measure
 from imop.baselines.samples import Samples, joined, stored_samples
 from imop.baselines.weights import Regressor, fast_products, make_network, save_network
-from imop.errors import CorruptData, ImopError, InvalidInput
+from imop.errors import CorruptData, InvalidInput
 from imop.files import replaced, writable_folder
 from imop.geometry.perception import Perception
 from imop.networks.descent import kept, schedule
@@ -250,18 +249,3 @@ def read_stores(stores: tuple[Path, ...], cache: Path, console: Console) -> Samp
             parts.append(stored_samples(store, cache, perception))
         console.print(f"{store}: {len(parts[-1])} keyframes of {len(parts[-1].instructions)} demonstrations")
     return joined(parts)
-
-
-def main() -> None:
-    """Command line of the training."""
-    config = tyro.cli(RegressorConfig, description=__doc__)
-    console = Console(highlight=False)
-    try:
-        config.check()
-        train(config, read_stores(config.stores, config.cache, console), console=console)
-    except ImopError as error:
-        sys.exit(f"error: {error}")
-
-
-if __name__ == "__main__":
-    main()

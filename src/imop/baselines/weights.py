@@ -97,7 +97,7 @@ def load_network(folder: Path, kind: str) -> tuple[Regressor, dict[str, Any]]:
         AssetMissing: if there is none; it names the command that trains one.
         CorruptData: if it is damaged, or of another kind.
     """
-    command = f"python -m imop.baselines.train --network {kind} --stores STORE ... --out {folder}"
+    command = f"imop baselines train --network {kind} --stores STORE ... --out {folder}"
     weights, card = read_weights(folder, command)
     if card.get("network") != kind:
         raise CorruptData(folder, f"holds a network of kind {card.get('network')}, not {kind}", command)

@@ -1,6 +1,5 @@
-"""`python -m imop.evaluation.regions`: pictures of the regions that Eq. (3) finds in a store, to look at."""
+"""Pictures of the regions that Eq. (3) finds in a store, to look at."""
 
-import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -68,18 +67,3 @@ def draw(store: DemonstrationStore, out: Path, count: int) -> list[Path]:
         save_picture(region_panels([store[number] for number in numbers]), path)
         written.append(path)
     return written
-
-
-def main() -> None:
-    """Parse the command line."""
-    parser = argparse.ArgumentParser(prog="python -m imop.evaluation.regions", description=__doc__)
-    parser.add_argument("--store", type=Path, required=True, help="demonstrations by imop collect --scenes 3")
-    parser.add_argument("--out", type=Path, required=True, help="folder of the pictures")
-    parser.add_argument("--count", type=int, default=10, help="sets of demonstrations to draw")
-    args = parser.parse_args()
-    for path in draw(DemonstrationStore.open(args.store), args.out, args.count):
-        print(path)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""`python -m imop.evaluation.spread_picture`: how far counterparts may lie on other things of the kind.
+"""How far counterparts may lie on other things of the kind.
 
 A demonstration of each task is recorded and the learned matcher finds the region of its first step. Every
 point of the region has the colour of its spread: small where other things of the kind are the same, seen from
@@ -10,7 +10,6 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
-import tyro
 from PIL import Image
 
 from imop.errors import InvalidInput
@@ -125,9 +124,8 @@ def _draw(axis: Axes, panel: Panel) -> PathCollection:
     return drawn
 
 
-def main() -> None:
-    """Command line."""
-    options = tyro.cli(Options, description=__doc__)
+def draw_spreads(options: Options) -> None:
+    """Record demonstrations, find their regions, and draw them."""
     model = load_model(options.weights)
     panels = []
     for task in chosen_tasks("tabletop", "base", options.tasks):
@@ -136,8 +134,3 @@ def main() -> None:
         region = first_region(model, demonstration)
         panels.append(Panel(title, demonstration.keyframes[0], region))
     save_spreads(panels, options.out)
-    print(f"written: {options.out}")
-
-
-if __name__ == "__main__":
-    main()

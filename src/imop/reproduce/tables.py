@@ -10,9 +10,9 @@ PROTOCOL = Path("runs/protocol")
 ABLATIONS = Path("runs/ablations")
 TUNED = Path("runs/tuned")
 
-_TRAINED = f"python -m imop.training.protocol --out {PROTOCOL} makes them"
-_ABLATED = f"python -m imop.training.ablations --out {ABLATIONS} makes them, see docs/training.md"
-_TUNED = f"python -m imop.baselines.adapt --out {TUNED}/views makes them"
+_TRAINED = f"imop training protocol --out {PROTOCOL} makes them"
+_ABLATED = f"imop training ablations --out {ABLATIONS} makes them, see docs/training.md"
+_TUNED = f"imop baselines adapt --out {TUNED}/views makes them"
 
 LEARNED, REGISTRATION = Row("learned", "learned"), Row("registration", "registration")
 PAPER = Row("paper", "paper")

@@ -1,0 +1,1 @@
+"""Training examples, the files that they lie in, and the tensors that they become."""

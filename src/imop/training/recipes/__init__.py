@@ -1,0 +1,1 @@
+"""Trainings of several commands, and what they put together."""

@@ -1,0 +1,1 @@
+"""Training pairs of recorded demonstrations, which nobody annotated."""

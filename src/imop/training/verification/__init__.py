@@ -1,0 +1,1 @@
+"""What the verification network is trained on, and its training."""
