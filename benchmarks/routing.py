@@ -26,9 +26,9 @@ from imop.evaluation.report import console_for_tables
 from imop.evaluation.statistics import wilson
 from imop.networks.model import BUNDLED, Model, load_model
 from imop.policy.router import Odds, prior
+from imop.training.data.route import Route
 from imop.training.data.route_batch import make_route_sample
 from imop.training.data.route_shards import RouteShard
-from imop.training.data.route import Route
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""`imop training`: what the networks are trained on, other trainings than `imop train`, pictures of regions."""
+"""`imop training`: what networks are trained on, other trainings than `imop train`, pictures of regions."""
 
 from pathlib import Path
 from typing import Annotated
@@ -83,7 +83,7 @@ def verification(config: Annotated[VerificationTraining, OmitArgPrefixes]) -> in
         config: how to train.
     """
     reached = train_verification(config)
-    console.print(", ".join(f"{name} {value:.3f}" for name, value in reached.items()))
+    console.print(_listed(reached), soft_wrap=True)
     return 0
 
 
@@ -97,7 +97,7 @@ def metrics(config: Annotated[MetricsOptions, OmitArgPrefixes]) -> int:
     model = load_model(config.weights)
     for folder in config.shards:
         found = validate(model, folder, config.pairs)
-        console.print(f"{folder.name}: " + ", ".join(f"{name} {value:.3f}" for name, value in found.items()))
+        console.print(f"{folder.name}: {_listed(found)}", soft_wrap=True)
     return 0
 
 
@@ -169,3 +169,7 @@ def spreads(config: Annotated[Options, OmitArgPrefixes]) -> int:
     draw_spreads(config)
     console.print(config.out)
     return 0
+
+
+def _listed(values: dict[str, float]) -> str:
+    return ", ".join(f"{name} {value:.3f}" for name, value in values.items())

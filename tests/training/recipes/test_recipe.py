@@ -27,10 +27,10 @@ from tests.training.synthetic.test_routes import route
 
 OUT = Path("/some where/small")
 CONFIGS = {
-    "imop.training.loop.train": TrainConfig,
-    "imop.training.verification.cases": CasesConfig,
-    "imop.training.recipes.merge": MergeConfig,
-    "imop.training.verification.fit": VerificationTraining,
+    "train": TrainConfig,
+    "training cases": CasesConfig,
+    "training merge": MergeConfig,
+    "training verification": VerificationTraining,
 }
 
 
@@ -42,10 +42,12 @@ def configs(name, jobs):
     """The configuration of every stage that is made of one, by the stage's name."""
     found = {}
     for stage in stages(RECIPES[name], OUT, jobs):
-        module = next((m for m in CONFIGS if m in words(stage)), None)
-        if module is not None:
-            arguments = words(stage)[words(stage).index(module) + 1 :]
-            found[stage.name] = tyro.cli(CONFIGS[module], args=arguments)
+        given = words(stage)
+        command, arguments = given[given.index("imop.cli") + 1], given[given.index("imop.cli") + 2 :]
+        if command == "training":
+            command, arguments = f"training {arguments[0]}", arguments[1:]
+        if command in CONFIGS:
+            found[stage.name] = tyro.cli(CONFIGS[command], args=arguments)
     return found
 
 

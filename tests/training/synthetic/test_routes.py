@@ -8,13 +8,13 @@ import torch
 
 from imop.errors import CorruptData, InvalidInput
 from imop.networks.graph import GraphConfig
+from imop.training.data.route import Query, Route, SeenState
 from imop.training.data.route_batch import QUERIES, collate_routes, cut, in_vain, make_route_sample
 from imop.training.data.route_shards import RouteShard, write_routes
 from imop.training.data.shards import Shard
 from imop.training.synthetic.families import TRAINING
 from imop.training.synthetic.generate import GenerateConfig, generate
 from imop.training.synthetic.mishaps import mishaps
-from imop.training.data.route import Query, Route, SeenState
 from imop.training.synthetic.routes import indistinguishable, synthetic_routes
 from imop.training.synthetic.scenes import demonstrate, draw_scene
 from imop.training.synthetic.stage import Unreachable
