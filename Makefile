@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 # One thread per process: two cores are better spent on two processes.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: install demo test lint wheel test-wheel test-lowest lock clean
+.PHONY: install demo test coverage lint wheel test-wheel test-lowest lock clean
 
 install: $(STAMP)
 
@@ -20,6 +20,10 @@ demo: install
 
 test: install lint
 	$(BIN)/pytest -n 2 --dist worksteal
+
+# Lines that the tests run, by file; fails below 90 %.
+coverage: install
+	$(BIN)/pytest -n 2 --dist worksteal --cov --cov-report=term-missing:skip-covered
 
 lint: install
 	$(BIN)/ruff check .

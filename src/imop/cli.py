@@ -31,10 +31,7 @@ from imop.viewing.command import view
 # Verbs import what they need when they run, so that --help does not wait for torch and MuJoCo.
 
 app = tyro.extras.SubcommandApp()
-GROUPS = {
-    "training": "Make what networks are trained on, train the verification, merge weights, draw regions.",
-    "baselines": "Train the regressors that the policy is compared with.",
-}
+GROUPS = ("training", "baselines")
 """Commands that have commands of their own, in `cli_NAME.py`, which is read when one is called."""
 Disturb = Literal["", "moved", "knocked", "missed", "shut"]
 
@@ -356,26 +353,33 @@ def model(config: Literal["small", "paper"] = "small", weights: Path | None = No
     return 0
 
 
-def _elsewhere() -> int:
-    """Stands for a group in the help of all commands."""
-    raise NotImplementedError
+@app.command
+def training() -> None:
+    """Make what networks are trained on, train the verification, merge weights, draw regions.
+
+    `imop training --help` says more.
+    """
 
 
-for _name, _help in GROUPS.items():
-    app.command(name=_name, help=_help)(_elsewhere)
+@app.command
+def baselines() -> None:
+    """Train the regressors that the policy is compared with.
+
+    `imop baselines --help` says more.
+    """
 
 
-def _read_group(arguments: Sequence[str]) -> None:
+def _perform(arguments: Sequence[str]) -> int:
     if arguments and arguments[0] in GROUPS:
-        group = import_module(f"imop.cli_{arguments[0]}").app
-        app.command(group, name=arguments[0], help=GROUPS[arguments[0]])
+        group = import_module(f"imop.cli_{arguments[0]}")
+        return int(group.app.cli(prog=f"imop {arguments[0]}", description=group.__doc__, args=arguments[1:]))
+    return int(app.cli(prog="imop", description=__doc__, args=arguments))
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point of `imop`."""
     try:
-        _read_group(sys.argv[1:] if arguments is None else arguments)
-        code = app.cli(prog="imop", description=__doc__, args=arguments)
+        code = _perform(sys.argv[1:] if arguments is None else arguments)
     except ImopError as error:
         code = _fail(str(error))
     except BrokenPipeError:

@@ -1,4 +1,4 @@
-"""`imop baselines`: trains the regressors that the policy is compared with (docs/baselines.md)."""
+"""The regressors that the policy is compared with (docs/baselines.md)."""
 
 from typing import Annotated
 

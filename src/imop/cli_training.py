@@ -1,4 +1,4 @@
-"""`imop training`: what networks are trained on, other trainings than `imop train`, pictures of regions."""
+"""What networks are trained on, other trainings than `imop train`, pictures of regions (docs/training.md)."""
 
 from pathlib import Path
 from typing import Annotated
