@@ -11,6 +11,7 @@ LAST_LINE = {
     "02_own_demonstration": "a demonstration of 3 steps",
     "03_own_camera_rig": "points of what stands on the table",
     "04_own_task": "of 2 scenes",
+    "05_batch_evaluation": "replay: 0 of 3",
     "06_own_matcher": "gripper to",
     "07_training_on_own_demonstrations": "imop run",
     "08_serving": "success",

@@ -5,6 +5,7 @@ from rich.console import Console
 from imop.errors import InvalidInput, MissingExtra
 from imop.evaluation import benchmark
 from imop.evaluation.benchmark import evaluate_suite, tried
+from imop.evaluation.config import EvaluationConfig
 from imop.evaluation.episodes import read_episodes
 from imop.evaluation.trials import Trial, demonstrations_for, suite_trials
 
@@ -36,8 +37,10 @@ def evaluated(tmp_path, monkeypatch):
     get_reusable_executor().shutdown()
 
     def evaluate(method, jobs=2):
-        choice = ("tabletop", "all", ("lid_off_pot",), [f"no_help:{method}"], 1, 0, 0, jobs)
-        results = evaluate_suite(*choice, Console(quiet=True), tmp_path / "episodes.jsonl")
+        config = EvaluationConfig(
+            tasks=("lid_off_pot",), methods=f"no_help:{method}", episodes=1, jobs=jobs, out=tmp_path
+        )
+        results = evaluate_suite(config, Console(quiet=True))
         return results, list(read_episodes(tmp_path / "episodes.jsonl"))
 
     yield evaluate

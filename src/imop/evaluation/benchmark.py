@@ -11,11 +11,12 @@ from rich.console import Console
 
 from imop.baselines.policy import REGRESSORS
 from imop.errors import AssetMissing, ImopError, InvalidInput, MissingExtra
+from imop.evaluation.config import EvaluationConfig
 from imop.evaluation.episodes import Episode, EpisodeLog, method_state
 from imop.evaluation.jobs import parallel
 from imop.evaluation.methods import Policy, make_policy
 from imop.evaluation.pointing import pointing
-from imop.evaluation.report import Count, Instances, Results
+from imop.evaluation.report import Count, Results
 from imop.evaluation.rollout import rollout
 from imop.evaluation.trials import (
     Trial,
@@ -53,47 +54,14 @@ SAME = (
 OTHER = "Every scene shows other objects of the demonstrated kind: shapes, sizes and colours are drawn anew."
 
 
-def evaluate_suite(
-    suite: str,
-    split: str,
-    tasks: tuple[str, ...],
-    methods: list[str],
-    episodes: int,
-    seed: int,
-    instance: int,
-    jobs: int,
-    console: Console,
-    log: Path,
-    weights: Path | None = None,
-    change: str = "",
-    instances: Instances = "same",
-    disturb: str = "",
-    second_try: bool = False,
-    demonstrations: int = 1,
-    baselines: Path | None = None,
-    robot: str = PANDA.name,
-) -> Results:
-    """Try every method in the same `episodes` scenes of every task.
+def evaluate_suite(config: EvaluationConfig, console: Console) -> Results:
+    """Try every method in the same scenes of every task.
+
+    Every episode is kept in `config.out`/episodes.jsonl, and what is in it is not tried again.
 
     Args:
-        suite: which suite.
-        split: which of its tasks.
-        tasks: only these; all if empty.
-        methods: names of `METHODS`, or of one's own, see `make_policy`.
-        episodes: scenes per task.
-        seed: of the first scene.
-        instance: of the objects.
-        jobs: processes.
+        config: which methods and scenes.
         console: for the progress.
-        log: file of episodes; what is in it is not tried again.
-        weights: of the learned policy; None for the bundled ones.
-        change: what the scenes differ in, names of `tasks.changes.FACTORS` joined by commas.
-        instances: whether the scenes show the demonstrated objects or others of their kind.
-        disturb: what goes wrong once in every episode, one of `tasks.disturbances.DISTURBANCES`, if any.
-        second_try: whether an episode goes on after a motion that cannot be planned, as a disturbed one does.
-        demonstrations: how many are shown, each but the first of another instance.
-        baselines: folder of the regressors' weights; None for the default one.
-        robot: the arm that shows and acts, see `sim.arms.ARMS`.
 
     Raises:
         InvalidInput: for an unknown suite, split, task, method, change, disturbance or robot, no
@@ -101,33 +69,48 @@ def evaluate_suite(
         MissingExtra: if the robot's model is not installed.
         CorruptData: if the log cannot be read.
     """
-    trials = suite_trials(suite, split, tasks, episodes, seed, instance, change, instances == "other")
-    if robot != PANDA.name and suite == "rlbench":
-        raise InvalidInput("robot", f"{robot} in suite {suite}", "panda; other arms in suite tabletop")
-    find_arm(robot)
-    trials = {
-        task: [
-            replace(trial, second_try=second_try, demonstrations=demonstrations, robot=robot)
-            for trial in of_task
-        ]
-        for task, of_task in trials.items()
-    }
-    without = set(trials)
-    trials = disturbed(trials, disturb) if disturb else trials
+    c, methods = config, config.methods.split(",")
+    possible = _scenes(config)
+    trials = disturbed(possible, c.disturb) if c.disturb else possible
     everything = [trial for of_task in trials.values() for trial in of_task]
-    found = tried(everything, methods, jobs, console, log, weights, baselines=baselines)
+    log = c.out / "episodes.jsonl"
+    found = tried(everything, methods, c.jobs, console, log, c.weights, baselines=c.baselines)
     counts = {
         method: {task: count_of([found[trial, method] for trial in trials[task]]) for task in trials}
         for method in methods
     }
-    names = ",".join(tasks) or split
-    notes = [*NOTES, SECOND_TRY if second_try or disturb else ENDS, OTHER if instances == "other" else SAME]
-    notes += [f"Shown were {demonstrations} demonstrations, each of another instance."] * (demonstrations > 1)
-    notes += change_notes(trials, change)
-    notes += [f"The arm is the {robot}, with the Panda's hand."] * (robot != PANDA.name)
-    if disturb:
-        notes += disturbance_notes(disturb, found, sorted(without - set(trials)))
-    return Results(suite, names, seed, counts, tuple(notes), change, instances, disturb)
+    notes = [*_notes(config), *change_notes(trials, c.change)]
+    if c.disturb:
+        notes += disturbance_notes(c.disturb, found, sorted(set(possible) - set(trials)))
+    names = ",".join(c.tasks) or c.split
+    return Results(c.suite, names, c.seed, counts, tuple(notes), c.change, c.instances, c.disturb)
+
+
+def _scenes(config: EvaluationConfig) -> dict[str, list[Trial]]:
+    """Of every task, before anything is disturbed."""
+    c = config
+    if c.robot != PANDA.name and c.suite == "rlbench":
+        raise InvalidInput("robot", f"{c.robot} in suite {c.suite}", "panda; other arms in suite tabletop")
+    find_arm(c.robot)
+    trials = suite_trials(
+        c.suite, c.split, c.tasks, c.episodes, c.seed, c.instance, c.change, c.instances == "other"
+    )
+
+    def as_wanted(trial: Trial) -> Trial:
+        return replace(trial, second_try=c.second_try, demonstrations=c.demonstrations, robot=c.robot)
+
+    return {task: list(map(as_wanted, of_task)) for task, of_task in trials.items()}
+
+
+def _notes(config: EvaluationConfig) -> list[str]:
+    """How the episodes were tried."""
+    notes = [*NOTES, SECOND_TRY if config.second_try or config.disturb else ENDS]
+    notes += [OTHER if config.instances == "other" else SAME]
+    if config.demonstrations > 1:
+        notes += [f"Shown were {config.demonstrations} demonstrations, each of another instance."]
+    if config.robot != PANDA.name:
+        notes += [f"The arm is the {config.robot}, with the Panda's hand."]
+    return notes
 
 
 def disturbance_notes(
@@ -175,7 +158,7 @@ def tried(
 
     What the log has of other code or weights is tried again. If `focus`, somebody points at the thing that is
     acted on first, in demonstration and scene. Demonstrations are kept for the next time in the folder
-    `kept`, if there is one, see `demonstration_for`. For the other arguments see `evaluate_suite`.
+    `kept`, if there is one, see `demonstration_for`. For the other arguments see `EvaluationConfig`.
 
     Raises:
         InvalidInput: for an unknown task or method, or one that nobody can point out things to.

@@ -9,9 +9,9 @@ from pathlib import Path
 from imop.demos.rlbench import episodes, read_episode
 from imop.errors import InvalidInput
 from imop.evaluation.appearance import Appearance
+from imop.evaluation.config import Instances
 from imop.evaluation.open_loop import Case
 from imop.evaluation.recordings import Recordings, objects_world
-from imop.evaluation.report import Instances
 from imop.evaluation.trials import Trial, suite_trials
 from imop.files import user_cache
 from imop.tasks.expert import ExpertFailed

@@ -4,11 +4,12 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
+from imop.evaluation.config import Instances
 from imop.evaluation.statistics import wilson
 from imop.files import replaced
 
@@ -28,10 +29,6 @@ class Count:
     def __str__(self) -> str:
         low, high = wilson(self.successes, self.trials)
         return f"{100 * self.rate:.0f} % [{100 * low:.0f}, {100 * high:.0f}]"
-
-
-Instances = Literal["same", "other"]
-"""Of the objects in a test scene, against the demonstrated ones."""
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from imop.evaluation.report import Instances
+from imop.evaluation.config import Instances
 from imop.evaluation.trials import Trial, disturbed, suite_trials
 from imop.reproduce.published import Published
 from imop.sim.parts.grocery import GROCERIES
