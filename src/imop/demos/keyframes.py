@@ -111,6 +111,34 @@ def pose_keyframes(
     return keyframes[1:]
 
 
+def gripper_states(
+    gripper_opening: FloatArray, times: FloatArray, *, window: float = 0.1, opening_change: float = 0.1
+) -> BoolArray:
+    """(n,) whether the gripper is open: whether its fingers opened or closed last.
+
+    The opening alone does not say it, for fingers that hold something wide are far from closed. Before the
+    first change the gripper is in the other state; if there is none, it is open from half of the stroke on.
+
+    Args:
+        gripper_opening: (n,) 0 closed .. 1 open; measured.
+        times: (n,) seconds, strictly increasing.
+        window: seconds.
+        opening_change: fraction of the stroke.
+
+    Raises:
+        InvalidInput: if the lengths differ or a number is not finite.
+    """
+    opening = as_finite("gripper_opening", gripper_opening, (None,))
+    t = as_finite("times", times, (len(opening),))
+    states = np.full(len(opening), bool(len(opening)) and opening[0] > 0.5)
+    for number, (start, end) in enumerate(_opening_changes(opening, t, window, opening_change).items()):
+        opens = opening[end] > opening[max(start - 1, 0)]
+        if number == 0:
+            states[:start] = not opens
+        states[start:] = opens
+    return states
+
+
 def _window(t: FloatArray, window: float) -> tuple[list[int], list[int]]:
     """First and last frame of the window around every frame; at least its neighbours, where it has any."""
     frames = np.arange(len(t))

@@ -74,7 +74,7 @@ def from_dict(fields: Mapping[str, Any], folder: Path = Path()) -> Setup:
         {name: _camera(cameras.table(name)) for name in cameras.names()},
         _gripper(gripper) if gripper.names() else None,
         _made(limits, Limits, speed=float, turn=float, joint_speed=float),
-        {name: _made(parts.table(name), Part, size=np.array, T_gripper_part=_pose) for name in parts.names()},
+        {name: _made(parts.table(name), Part, size=np.array, T_gripper_part=read_pose) for name in parts.names()},
     )
     return setup
 
@@ -185,7 +185,7 @@ def _robot(table: _Table, folder: Path) -> RobotSetup:
     def model(value: Any) -> str:
         return str((folder / value).resolve()) if str(value).endswith((".xml", ".urdf")) else _text(value)
 
-    return _made(table, RobotSetup, model=model, home=np.array, T_world_base=_pose, joints=_names)
+    return _made(table, RobotSetup, model=model, home=np.array, T_world_base=read_pose, joints=_names)
 
 
 def _gripper(table: _Table) -> GripperSetup:
@@ -205,18 +205,18 @@ def _camera(table: _Table) -> CameraSetup:
     return _made(
         table,
         CameraSetup,
-        intrinsics=_intrinsics,
+        intrinsics=read_intrinsics,
         size=tuple,
-        T_world_camera=_pose,
-        T_gripper_camera=_pose,
+        T_world_camera=read_pose,
+        T_gripper_camera=read_pose,
         seen_as=_text,
     )
 
 
 def _accepted(read_value: Callable[[Any], Any]) -> str:
     known: dict[Any, str] = {
-        _pose: _POSE,
-        _intrinsics: _INTRINSICS,
+        read_pose: _POSE,
+        read_intrinsics: _INTRINSICS,
         _text: "a text",
         _names: "a list of names",
         float: "a number",
@@ -239,7 +239,12 @@ def _names(value: Any) -> tuple[str, ...]:
     return tuple(_text(one) for one in value)
 
 
-def _pose(value: Any) -> FloatArray:
+def read_pose(value: Any) -> FloatArray:
+    """A pose (4, 4) as files have it: position and quaternion x y z w, or four rows of four numbers.
+
+    Raises:
+        InvalidInput: if it is neither.
+    """
     if not isinstance(value, Mapping):
         return as_pose("pose", value)
     table = _Table("", value)
@@ -251,7 +256,12 @@ def _pose(value: Any) -> FloatArray:
     return se3.from_pose7(np.concatenate([position, quaternion]))
 
 
-def _intrinsics(value: Any) -> FloatArray:
+def read_intrinsics(value: Any) -> FloatArray:
+    """(3, 3) as files have it: fx, fy, cx and cy in pixels, or three rows of three numbers.
+
+    Raises:
+        InvalidInput: if it is neither.
+    """
     if not isinstance(value, Mapping):
         return as_finite("intrinsics", value, (3, 3))
     table = _Table("", value)
