@@ -4,7 +4,7 @@ import numpy as np
 
 from imop.errors import InvalidInput
 from imop.geometry.se3 import rotation_distance, translation_distance
-from imop.types import BoolArray, FloatArray, as_finite
+from imop.types import BoolArray, FloatArray, IntArray, as_finite
 
 STOP_BUFFER = 4
 
@@ -66,8 +66,8 @@ def pose_keyframes(
 ) -> list[int]:
     """A rule for recordings without joint velocities: from where the gripper was, and when.
 
-    The gripper rests in a frame if its displacement over a `window` around that frame is slower than
-    `at_rest`. A stretch of rest gives one keyframe, its slowest frame. A change of the opening gives one, the
+    The gripper rests where its displacement over a `window` is slower than `at_rest`. A stretch of rest gives
+    one keyframe, the middle of its slowest window. A change of the opening gives one, the
     frame where the fingers have settled; it stands for the rest around it, because arms stand while
     grippers move. The last frame is one. Of consecutive keyframes whose poses are not `apart`, only a
     change of the opening counts, or else the last of them if the episode ends there.
@@ -97,8 +97,7 @@ def pose_keyframes(
         )
     if n < 2:
         return []
-    before, after = _window(t, window)
-    rest = _rests(T, t, before, after, at_rest)
+    rest = _rests(T, t, window, at_rest)
     changes = _opening_changes(opening, t, window, opening_change)
     keyframes = [0]
     for i in sorted({*changes.values(), *_outside(rest, changes), n - 1}):
@@ -139,21 +138,20 @@ def gripper_states(
     return states
 
 
-def _window(t: FloatArray, window: float) -> tuple[list[int], list[int]]:
-    """First and last frame of the window around every frame; at least its neighbours, where it has any."""
-    frames = np.arange(len(t))
+def _windows(t: FloatArray, window: float) -> IntArray:
+    """(n - 1,) last frame of the window that begins at each frame but the last.
+
+    It is no longer than `window`, unless frames are farther apart than that: a hand that turns back stands for
+    a frame or two, and what it does before and after would hide that.
+    """
     # Half a microsecond absorbs rounding: at a fixed rate every window then has equally many frames.
-    before = np.searchsorted(t, t - window / 2 - 5e-7)
-    after = np.searchsorted(t, t + window / 2 + 5e-7, side="right") - 1
-    before = np.maximum(np.minimum(before, frames - 1), 0)
-    after = np.minimum(np.maximum(after, frames + 1), len(t) - 1)
-    return before.tolist(), after.tolist()
+    after = np.searchsorted(t, t[:-1] + window + 5e-7, side="right") - 1
+    return np.maximum(after, np.arange(1, len(t))).astype(np.int32)
 
 
-def _rests(
-    T: FloatArray, t: FloatArray, before: list[int], after: list[int], at_rest: tuple[float, float]
-) -> dict[int, range]:
+def _rests(T: FloatArray, t: FloatArray, window: float, at_rest: tuple[float, float]) -> dict[int, range]:
     """Slowest frame of every stretch of rest -> the stretch."""
+    before, after = np.arange(len(t) - 1), _windows(t, window)
     seconds = t[after] - t[before]
     speed = np.maximum(
         translation_distance(T[before], T[after]) / seconds / at_rest[0],
@@ -161,9 +159,12 @@ def _rests(
     )
     # A stretch ends only at twice the speed that makes it one, so that noise does not cut it into several.
     edges = np.flatnonzero(np.diff(np.concatenate([[False], speed < 2, [False]]).astype(np.int8)))
-    stretches = [range(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
-    slowest = {s[int(np.argmin(speed[s.start : s.stop]))]: s for s in stretches}
-    return {i: s for i, s in slowest.items() if speed[i] < 1}
+    rests = {}
+    for first, end in edges.reshape(-1, 2).tolist():
+        slowest = first + int(np.argmin(speed[first:end]))
+        if speed[slowest] < 1:
+            rests[int(before[slowest] + after[slowest] + 1) // 2] = range(first, int(after[end - 1]) + 1)
+    return rests
 
 
 def _opening_changes(opening: FloatArray, t: FloatArray, window: float, change: float) -> dict[int, int]:
