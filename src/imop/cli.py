@@ -17,6 +17,7 @@ from imop import cli_data
 from imop.calibration.command import calibrate
 from imop.errors import ImopError, InvalidInput
 from imop.files import writable_folder
+from imop.recording.command import record
 from imop.reproduce.command import reproduce
 from imop.serving.command import serve
 from imop.setup.command import setup
@@ -236,6 +237,7 @@ def evaluate(
 app.command(reproduce)
 app.command(setup)
 app.command(calibrate)
+app.command(record)
 app.command(serve)
 app.command(name="import")(cli_data.import_)
 app.command(cli_data.export)

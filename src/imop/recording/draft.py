@@ -38,7 +38,7 @@ class Draft:
         frames, n = tuple(int(frame) for frame in self.frames), len(self.source.motion)
         if len(frames) < 2:
             raise InvalidInput("keyframes", f"{len(frames)} of them", "a beginning and at least one more")
-        if not (0 <= frames[0] and frames[-1] < n and np.all(np.diff(frames) > 0)):
+        if frames[0] < 0 or frames[-1] >= n or np.any(np.diff(frames) <= 0):
             accepted = f"each later than the one before, frames 0 .. {n - 1}"
             raise InvalidInput("keyframes", f"frames {', '.join(map(str, frames))}", accepted)
         object.__setattr__(self, "frames", frames)

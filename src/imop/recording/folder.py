@@ -300,7 +300,9 @@ def read_camera(fields: Mapping[str, Any]) -> RecordedCamera:
 def _scale(value: Any) -> float:
     scale = float(as_finite("depth_scale", value, ()))
     if not 1e-6 <= scale <= 1.0:
-        raise InvalidInput("depth_scale", f"{scale:g}", "metres per unit: 0.001 for millimetres, 1.0 for metres")
+        raise InvalidInput(
+            "depth_scale", f"{scale:g}", "metres per unit: 0.001 for millimetres, 1.0 for metres"
+        )
     return scale
 
 

@@ -74,7 +74,10 @@ def from_dict(fields: Mapping[str, Any], folder: Path = Path()) -> Setup:
         {name: _camera(cameras.table(name)) for name in cameras.names()},
         _gripper(gripper) if gripper.names() else None,
         _made(limits, Limits, speed=float, turn=float, joint_speed=float),
-        {name: _made(parts.table(name), Part, size=np.array, T_gripper_part=read_pose) for name in parts.names()},
+        {
+            name: _made(parts.table(name), Part, size=np.array, T_gripper_part=read_pose)
+            for name in parts.names()
+        },
     )
     return setup
 
