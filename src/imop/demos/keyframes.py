@@ -141,8 +141,8 @@ def gripper_states(
 def _windows(t: FloatArray, window: float) -> IntArray:
     """(n - 1,) last frame of the window that begins at each frame but the last.
 
-    It is no longer than `window`, unless frames are farther apart than that: a hand that turns back stands for
-    a frame or two, and what it does before and after would hide that.
+    It is no longer than `window`, unless frames are farther apart than that: a hand that turns back stands
+    for a frame or two, and what it does before and after would hide that.
     """
     # Half a microsecond absorbs rounding: at a fixed rate every window then has equally many frames.
     after = np.searchsorted(t, t[:-1] + window + 5e-7, side="right") - 1

@@ -62,6 +62,7 @@ def record(
 
     Args:
         folder: of the recording: new, or as an earlier call left it.
+        simulation: the expert, if it is no real arm.
         setup: the set-up (docs/real_robot/setup.md), for a real arm.
         rig: module:function that returns the drivers of arm and cameras, an imop.calibration.collect.Rig.
         rate: frames per second.

@@ -30,6 +30,7 @@ FORMAT = "imop-recording"
 VERSION = 1
 NAME, FRAMES, KEYFRAMES = "recording.json", "frames.jsonl", "keyframes.json"
 _REMEDY = "see docs/real_robot/recording.md for the format"
+_SCALE = "metres per unit of the depth images: 0.001 for millimetres, 1.0 for metres"
 _POSE = "{position: [x, y, z], quaternion: [x, y, z, w]} in metres, or four rows of four numbers"
 
 
@@ -59,8 +60,7 @@ class RecordedCamera:
             accepted = "{fx, fy, cx, cy} in pixels, or three rows of three numbers"
             raise InvalidInput(f"cameras.{name}.intrinsics", "missing", accepted)
         if self.depth_scale is None:
-            accepted = "metres per unit of its depth images: 0.001 for millimetres, 1.0 for metres"
-            raise InvalidInput(f"cameras.{name}.depth_scale", "missing", accepted)
+            raise InvalidInput(f"cameras.{name}.depth_scale", "missing", _SCALE)
         if self.T_world_camera is None and self.T_gripper_camera is None:
             accepted = f"{_POSE}; T_gripper_camera of a camera on the gripper (imop calibrate finds both)"
             raise InvalidInput(f"cameras.{name}.T_world_camera", "missing", accepted)
@@ -300,9 +300,7 @@ def read_camera(fields: Mapping[str, Any]) -> RecordedCamera:
 def _scale(value: Any) -> float:
     scale = float(as_finite("depth_scale", value, ()))
     if not 1e-6 <= scale <= 1.0:
-        raise InvalidInput(
-            "depth_scale", f"{scale:g}", "metres per unit: 0.001 for millimetres, 1.0 for metres"
-        )
+        raise InvalidInput("depth_scale", f"{scale:g}", _SCALE)
     return scale
 
 

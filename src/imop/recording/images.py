@@ -53,7 +53,9 @@ def read_depth(folder: Path, name: str, frame: int) -> Float32Array:
     """(H, W) float32, in the units of the file.
 
     Args:
-        folder, name, frame: as in `read_color`.
+        folder: of the recording.
+        name: as in `read_color`.
+        frame: number of the frame.
 
     Raises:
         CorruptData: if it is missing, damaged, or has more than one channel or 8 bits.

@@ -13,7 +13,7 @@ from imop.errors import InvalidInput
 from imop.recording.recorder import DemonstrationRecorder
 
 GAP = 1.0
-"""Seconds between the last frame of an interrupted recording and the next one, if the arm's clock began anew."""
+"""Seconds after the last frame of an interrupted recording at which the next one is, if clocks began anew."""
 
 Keys = Callable[[], str | None]
 """What was typed since the last call: a line, or None."""

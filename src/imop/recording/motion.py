@@ -51,7 +51,7 @@ class Motion:
         return len(self.times)
 
     def find_keyframes(self) -> list[int]:
-        """Increasing frame numbers, none of them 0: where the hand rested or the fingers moved, and the end."""
+        """Frames where the hand rested or the fingers moved, and the last one; increasing, none of them 0."""
         return pose_keyframes(self.T_world_gripper, self.gripper_opening, self.times)
 
     @property

@@ -17,7 +17,6 @@ from imop.files import writable_folder
 from imop.recording.draft import Draft
 from imop.recording.folder import (
     FRAMES,
-    NAME,
     Recorded,
     RecordedCamera,
     RecordedFolder,

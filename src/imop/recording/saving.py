@@ -41,8 +41,8 @@ def save_all(
         track: wraps the drafts, to show progress.
 
     Raises:
-        InvalidInput: if `out` exists and is no store, or intrinsics, a camera's pose or the scale of its depth
-            are missing; nothing more is stored then.
+        InvalidInput: if `out` exists and is no store, or intrinsics, a camera's pose or the scale of its
+            depth are missing; nothing more is stored then.
         CorruptData: if `out` is a damaged store.
     """
     exists = out.is_dir() and any(out.iterdir())
