@@ -13,7 +13,7 @@ frames may then stand in recording.json as well.
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -221,12 +221,12 @@ def read_folder(folder: Path) -> RecordedFolder:
     if not isinstance(described, dict) or not described:
         raise InvalidInput(f"{NAME}: cameras", "missing", "a table of cameras by name")
     cameras = {
-        str(name): parsed(f"{NAME}: cameras.{name}", lambda f=fields: read_camera(f))
+        str(name): parsed(f"{NAME}: cameras.{name}", partial(read_camera, fields))
         for name, fields in described.items()
     }
     lines = [(f"{NAME}: frames[{i}]", one) for i, one in enumerate(content.get("frames", ()))]
     lines += [(f"{FRAMES}, line {i + 1}", one) for i, one in enumerate(_lines(folder / FRAMES))]
-    frames = [parsed(where, lambda f=fields: _frame(f, cameras)) for where, fields in lines]
+    frames = [parsed(where, partial(_frame, fields, cameras)) for where, fields in lines]
     words = content.get("instructions", [])
     return RecordedFolder(
         folder,

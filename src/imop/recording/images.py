@@ -42,7 +42,7 @@ def read_color(folder: Path, name: str, frame: int) -> ByteArray:
     Raises:
         CorruptData: if it is missing, damaged, or no 8 bit colour image.
     """
-    image = _read(folder, name, frame, 3)
+    image: ByteArray = _read(folder, name, frame, 3)
     if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
         problem = f"{image.dtype} of shape {image.shape}"
         raise CorruptData(folder / name, problem, "give red, green and blue of 8 bit, (H, W, 3)")
@@ -66,7 +66,8 @@ def read_depth(folder: Path, name: str, frame: int) -> Float32Array:
     if image.ndim != 2 or image.dtype == np.uint8 or image.dtype.kind not in "uif":
         problem = f"{image.dtype} of shape {image.shape}"
         raise CorruptData(folder / name, problem, "give one channel of 16 bit, or of floats, (H, W)")
-    return image.astype(np.float32)
+    values: Float32Array = image.astype(np.float32)
+    return values
 
 
 def _read(folder: Path, name: str, frame: int, axes: int) -> Any:

@@ -6,21 +6,25 @@ from pathlib import Path
 from imop.errors import CorruptData
 from imop.files import read, replaced
 from imop.recording.draft import Draft
-from imop.recording.folder import KEYFRAMES, read_folder
+from imop.recording.folder import KEYFRAMES, RecordedFolder, read_folder
 
 
-def load_draft(folder: Path) -> Draft:
+def load_draft(folder: Path, recording: RecordedFolder | None = None) -> Draft:
     """A recording with its keyframes: those that were kept, or else those that are found.
+
+    Args:
+        folder: of the recording.
+        recording: what was read of it, if it was.
 
     Raises:
         CorruptData: if the recording or its keyframes cannot be read.
         InvalidInput: for a field of them that cannot be.
     """
-    recording, path = read_folder(folder), folder / KEYFRAMES
+    source, path = recording or read_folder(folder), folder / KEYFRAMES
     if not path.exists():
-        return Draft.of(recording)
+        return Draft.of(source)
     try:
-        return Draft(recording, tuple(int(frame) for frame in json.loads(read(path))["frames"]))
+        return Draft(source, tuple(int(frame) for frame in json.loads(read(path))["frames"]))
     except (ValueError, KeyError, TypeError) as error:
         problem, remedy = f"does not name frames ({error})", "remove it; keyframes are then found anew"
         raise CorruptData(path, problem, remedy) from error

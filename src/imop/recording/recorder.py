@@ -17,6 +17,7 @@ from imop.files import writable_folder
 from imop.recording.draft import Draft
 from imop.recording.folder import (
     FRAMES,
+    KEYFRAMES,
     Recorded,
     RecordedCamera,
     RecordedFolder,
@@ -25,7 +26,7 @@ from imop.recording.folder import (
     whole_lines,
 )
 from imop.recording.images import DEPTH_STEP, write_color, write_depth
-from imop.recording.keyframes_file import KEYFRAMES, load_draft, save_draft
+from imop.recording.keyframes_file import load_draft, save_draft
 from imop.robots.interfaces import RobotState
 from imop.setup.setup import Setup
 

@@ -175,9 +175,9 @@ def _watch(world: World, rate: float, look: Callable[[int], None]) -> None:
 def _setup(arm: Arm, cameras: Mapping[str, tuple[Camera, FloatArray]], size: tuple[int, int]) -> Setup:
     known = {}
     for name, (camera, T_camera_told) in cameras.items():
-        mount = "T_gripper_camera" if camera.on_gripper else "T_world_camera"
-        place = {mount: camera.T_mount_camera @ T_camera_told}
-        known[name] = CameraSetup(camera.intrinsics(*size), size, **place)
+        T, K = camera.T_mount_camera @ T_camera_told, camera.intrinsics(*size)
+        places = (None, T) if camera.on_gripper else (T, None)
+        known[name] = CameraSetup(K, size, *places)
     # What the gripper may reach begins above the table, what is seen below it.
     lower = WORKSPACE_LOWER - (0.0, 0.0, 0.05)
     workspace = WorkspaceSetup(lower, WORKSPACE_UPPER, TABLE_HEIGHT)
