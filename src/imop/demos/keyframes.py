@@ -7,6 +7,8 @@ from imop.geometry.se3 import rotation_distance, translation_distance
 from imop.types import BoolArray, FloatArray, IntArray, as_finite
 
 STOP_BUFFER = 4
+SUDDEN = 5.0
+"""A hand that was so many times as fast within three windows before and after has stopped."""
 
 
 def published_keyframes(
@@ -162,9 +164,19 @@ def _rests(T: FloatArray, t: FloatArray, window: float, at_rest: tuple[float, fl
     rests = {}
     for first, end in edges.reshape(-1, 2).tolist():
         slowest = first + int(np.argmin(speed[first:end]))
-        if speed[slowest] < 1:
+        if speed[slowest] < 1 or _turns_back(speed, t, slowest, window):
             rests[int(before[slowest] + after[slowest] + 1) // 2] = range(first, int(after[end - 1]) + 1)
     return rests
+
+
+def _turns_back(speed: FloatArray, t: FloatArray, slowest: int, window: float) -> bool:
+    """Whether a hand that never quite rests was far faster just before and just after.
+
+    Frames that are as far apart as a turn is long see a part of the way to it and a part of the way from it.
+    """
+    first, end = np.searchsorted(t[:-1], (t[slowest] - 3 * window, t[slowest] + 3 * window))
+    fast = speed > SUDDEN * speed[slowest]
+    return bool(np.any(fast[first:slowest]) and np.any(fast[slowest:end]))
 
 
 def _opening_changes(opening: FloatArray, t: FloatArray, window: float, change: float) -> dict[int, int]:
@@ -177,8 +189,10 @@ def _opening_changes(opening: FloatArray, t: FloatArray, window: float, change: 
             start = i
             while i < len(opening) - 1 and abs(opening[later[i]] - opening[i]) > change / 2:
                 i += 1
-            changes[start] = i
-            level = opening[i]
+            # What returns at once was pressed open by what is held, or is noise.
+            if abs(opening[i] - level) > change:
+                changes[start] = i
+                level = opening[i]
         i += 1
     return changes
 

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from imop.demos.findings import Finding
     from imop.recording.draft import Draft
 
-Layout = Literal["rlbench", "rosbag", "lerobot", "folder"]
+RawLayout = Literal["rosbag", "lerobot", "folder"]
+Layout = Literal["rlbench"] | RawLayout
 
 
 def import_(
@@ -58,10 +59,10 @@ def import_(
         picture: PNG file for what was seen in the keyframes, of a single episode.
     """
     if layout == "rlbench":
-        given = {"side": side, "setup": setup, "episode": episode, "picture": picture}
-        given |= {"move": move or None, "add": add or None, "remove": remove or None}
-        for name, value in (given | {"dry_run": dry_run or None}).items():
-            if value is not None:
+        given: dict[str, object] = {"side": side, "setup": setup, "episode": episode, "picture": picture}
+        given |= {"move": move, "add": add, "remove": remove, "dry_run": dry_run}
+        for name, value in given.items():
+            if value not in (None, (), False):
                 raise InvalidInput(name, "given for rlbench", "rosbag, lerobot or folder")
         return _rlbench(source, out, cameras)
     if cameras is not None:
@@ -90,7 +91,7 @@ def import_(
 
 
 def _drafts(
-    layout: Layout, source: Path, side: Path | None, setup: Path | None, episode: int | None
+    layout: RawLayout, source: Path, side: Path | None, setup: Path | None, episode: int | None
 ) -> "list[Draft]":
     from imop.importing.sources import find_sources
     from imop.recording.draft import Draft

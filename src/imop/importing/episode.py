@@ -95,9 +95,7 @@ def poses_of(numbers: FloatArray, how: PoseFormat, T_frame_gripper: FloatArray) 
     return np.asarray(np.array([se3.from_pose7(row[order]) for row in rows]) @ T_frame_gripper)
 
 
-def kinematic_poses(
-    side: Side, joint_positions: FloatArray | None, lacking: str, accepted: str
-) -> FloatArray:
+def kinematic_poses(side: Side, joint_positions: FloatArray, lacking: str, accepted: str) -> FloatArray:
     """(n, 4, 4) poses of the gripper by the arm of the set-up.
 
     Args:

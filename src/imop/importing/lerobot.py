@@ -81,7 +81,7 @@ class Dataset:
         images = [name for name, f in self.features.items() if f["dtype"] in ("image", "video")]
         depths = [name for name in images if self._is_depth(name)]
         colors = [name for name in images if name not in depths]
-        if self.side.cameras:
+        if self.side.chooses:
             chosen = {name: (camera.rgb, camera.depth) for name, camera in self.side.cameras.items()}
             for name, pair in chosen.items():
                 for kind, feature, there in zip(("rgb", "depth"), pair, (colors, images), strict=True):
@@ -103,6 +103,7 @@ class Dataset:
                 raise InvalidInput("cameras.NAME.depth", "the dataset marks no feature as depth", accepted)
             accepted = f"[cameras.NAME] with rgb and depth, of {', '.join(images)}"
             raise InvalidInput("cameras", "no colours are called as a depth is, without _depth", accepted)
+        self.side.require_names(found)
         return found
 
     def _is_depth(self, name: str) -> bool:

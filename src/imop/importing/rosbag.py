@@ -169,7 +169,7 @@ def _cameras(found: Contents, side: Side) -> dict[str, SideCamera]:
     """Camera -> its topics, by the side file, or else by their names."""
     colors = [topic for topic, images in found.images.items() if images.kind in COLORS]
     depths = [topic for topic, images in found.images.items() if images.kind in DEPTHS]
-    if side.cameras:
+    if side.chooses:
         for name, camera in side.cameras.items():
             for kind, topic, there in (("rgb", camera.rgb, colors), ("depth", camera.depth, depths)):
                 if topic not in there:
@@ -177,9 +177,8 @@ def _cameras(found: Contents, side: Side) -> dict[str, SideCamera]:
                     raise InvalidInput(f"cameras.{name}.{kind}", problem, _listed(there))
         return dict(side.cameras)
     if not colors or not depths:
-        lacking = "depth" if colors else "rgb"
-        there = _listed(found.images)
-        accepted = f"a topic of {'depth (16UC1 or 32FC1)' if colors else 'colours'}; images are in: {there}"
+        lacking, what = ("depth", "depth (16UC1 or 32FC1)") if colors else ("rgb", "colours")
+        accepted = f"a topic of {what}; images are in: {_listed(found.images)}"
         raise InvalidInput(f"cameras.NAME.{lacking}", "there is none in the bag", accepted)
     pairs = {}
     for color in colors:
@@ -192,6 +191,7 @@ def _cameras(found: Contents, side: Side) -> dict[str, SideCamera]:
             accepted = f"[cameras.NAME] with rgb and depth in a side file, of {_listed([*colors, *depths])}"
             raise InvalidInput("cameras", f"the depth of {color} is not clear", accepted)
         pairs[_namespace(color) or "camera"] = SideCamera(color, aligned[0])
+    side.require_names(pairs)
     return pairs
 
 
@@ -355,4 +355,4 @@ def _motion(found: Contents, side: Side, world: str, stamps: FloatArray) -> Moti
 
 def _interpolated(told: Mapping[float, float], stamps: FloatArray) -> FloatArray:
     times = np.array(sorted(told))
-    return np.interp(stamps, times, np.array([told[time] for time in times.tolist()]))
+    return np.asarray(np.interp(stamps, times, np.array([told[time] for time in times.tolist()])))

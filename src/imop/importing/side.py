@@ -4,7 +4,7 @@ A TOML or JSON file. All of it is optional; an importer names what it needs and 
 docs/real_robot/importing.md shows one.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -67,6 +67,23 @@ class Side:
     pose_format: PoseFormat = "xyzw"
     T_frame_gripper: FloatArray = field(default_factory=lambda: np.eye(4))
     setup: Setup | None = None
+
+    @property
+    def chooses(self) -> bool:
+        """Whether it says which images are whose; else cameras are found by the names of their images."""
+        return any(camera.rgb or camera.depth for camera in self.cameras.values())
+
+    def require_names(self, found: Iterable[str]) -> None:
+        """Refuse cameras that a recording does not have.
+
+        Raises:
+            InvalidInput: for the first of them.
+        """
+        there = list(found)
+        for name in self.cameras:
+            if name not in there:
+                accepted = f"{', '.join(there)}; or rgb and depth of every camera"
+                raise InvalidInput(f"cameras.{name}", "no such camera in the recording", accepted)
 
     def camera(self, name: str, recorded: RecordedCamera) -> RecordedCamera:
         """What is known of a camera: by this file, then by the recording, then by the set-up."""

@@ -60,8 +60,6 @@ def _is_bag(path: Path) -> bool:
 
 
 def _with_side(recording: RecordedFolder, side: Side) -> RecordedFolder:
-    for name in side.cameras:
-        if name not in recording.cameras:
-            raise InvalidInput(f"cameras.{name}", "not in the recording", ", ".join(recording.cameras))
+    side.require_names(recording.cameras)
     cameras = {name: side.camera(name, camera) for name, camera in recording.cameras.items()}
     return replace(recording, cameras=cameras)

@@ -78,6 +78,9 @@ class RecordedCamera:
         else:
             assert self.T_world_camera is not None
             T = self.T_world_camera
+        if np.shape(rgb)[:2] != np.shape(depth):
+            problem = f"has {np.shape(depth)} pixels, its colours have {np.shape(rgb)[:2]}"
+            raise InvalidInput(f"cameras.{name}.depth", problem, "depth that is aligned to the colours")
         try:
             return CameraView(rgb, np.asarray(depth, np.float32) * self.depth_scale, self.intrinsics, T)
         except InvalidInput as error:
