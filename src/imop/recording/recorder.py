@@ -2,6 +2,7 @@
 
 import json
 import os
+import threading
 from collections import deque
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -44,6 +45,18 @@ class _Pending:
     images: Sequence[Future[None]]
 
 
+class _Syncing:
+    """Has the system write what a failure of the power would lose; a slow disk holds nobody up."""
+
+    def __init__(self) -> None:
+        self._thread: threading.Thread | None = None
+
+    def ask(self) -> None:
+        if self._thread is None or not self._thread.is_alive():
+            self._thread = threading.Thread(target=os.sync, daemon=True)
+            self._thread.start()
+
+
 class DemonstrationRecorder:
     """Appends what is seen and measured to a folder; `stop` finds the keyframes.
 
@@ -65,6 +78,7 @@ class DemonstrationRecorder:
         self._synced = self.last
         self._pool = ThreadPoolExecutor(_WORKERS)
         self._pending: deque[_Pending] = deque()
+        self._syncing = _Syncing()
 
     @classmethod
     def start(
@@ -166,9 +180,9 @@ class DemonstrationRecorder:
         try:
             self._append(np.inf)
         finally:
-            self._pool.submit(os.sync)
             self._pool.shutdown()
             self._lines.close()
+            self._syncing.ask()
 
     def __enter__(self) -> Self:
         return self
@@ -207,8 +221,7 @@ class DemonstrationRecorder:
             self._lines.flush()
             self._pending.popleft()
             if self._synced is None or first.recorded.stamp - self._synced > UNWRITTEN:
-                # What only the system has a failure of the power would lose.
-                self._pool.submit(os.sync)
+                self._syncing.ask()
                 self._synced = first.recorded.stamp
 
 
