@@ -42,6 +42,8 @@ ALLOWED = {
     },
 }
 ALLOWED["terminal"] = set()
+ALLOWED["recording"] = ALLOWED["calibration"] | {"calibration", "tasks"}
+ALLOWED["importing"] = ALLOWED["recording"] | {"recording"}
 ALLOWED["reproduce"] = ALLOWED["evaluation"] | {"evaluation", "terminal"}
 ALLOWED["viewing"] = ALLOWED["reproduce"] | {"cameras", "setup"}
 ALLOWED["serving"] = BASE | {"geometry", "demos", "policy", "evaluation", "terminal"}

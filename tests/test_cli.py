@@ -22,6 +22,7 @@ VERBS = (
     "run",
     "collect",
     "eval",
+    "record",
     "import",
     "export",
     "check",

@@ -20,6 +20,8 @@ from imop.calibration.command import calibrate
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.config import Disturb, EvaluationConfig
 from imop.files import writable_folder
+from imop.importing.command import import_
+from imop.recording.command import record
 from imop.reproduce.command import reproduce
 from imop.serving.command import serve
 from imop.setup.command import setup
@@ -177,8 +179,9 @@ def evaluate(config: Annotated[EvaluationConfig, tyro.conf.OmitArgPrefixes]) -> 
 app.command(reproduce)
 app.command(setup)
 app.command(calibrate)
+app.command(record)
 app.command(serve)
-app.command(name="import")(cli_data.import_)
+app.command(name="import")(import_)
 app.command(cli_data.export)
 app.command(cli_data.check)
 app.command(cli_data.predict)

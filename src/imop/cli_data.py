@@ -11,37 +11,6 @@ from imop.files import writable_folder
 from imop.terminal import console, list_folder, status, track
 
 
-def import_(
-    layout: Positional[Literal["rlbench"]],
-    source: Positional[Path],
-    out: Positional[Path],
-    cameras: Annotated[str | None, tyro.conf.arg(metavar="NAME,NAME")] = None,
-) -> int:
-    """Convert recorded demonstrations into a store.
-
-    Nothing that can be read is left out; what `imop check` would say about it is said. Episodes that are in
-    the store already are not stored again, so an import that was stopped is continued by starting it again.
-
-    Args:
-        layout: how the recordings are laid out: rlbench as PerAct, RVT and Act3D use it.
-        source: an episode, a task folder, or a folder of task folders.
-        out: folder of the store; an existing one is appended to.
-        cameras: which cameras, joined by commas; by default front, left_shoulder, right_shoulder and wrist,
-            as far as they were recorded.
-    """
-    from imop.demos.rlbench_import import import_rlbench
-    from imop.robots.panda import tip_pose
-
-    names = None if cameras is None else cameras.split(",")
-    done = import_rlbench(source, out, names, tip_pose, lambda these: track(these, f"importing {source}"))
-    for finding in done.findings:
-        console.print(str(finding))
-    console.print(
-        f"{done.stored} demonstrations imported into {out}, {done.there_already} were there already"
-    )
-    return 1 if any(finding.severity == "error" for finding in done.findings) else 0
-
-
 def export(layout: Positional[Literal["rlbench"]], store: Positional[Path], out: Positional[Path]) -> int:
     """Write a store in the layout of other programs.
 

@@ -108,7 +108,7 @@ class Collect:
             cell.rig.robot.move_to(cell.T_base_gripper)
             rig, board_on, move = cell.rig, cell.board_on, True
         else:
-            rig, board_on, move = _rig(self.rig), self.board_on, self.move
+            rig, board_on, move = find_rig(self.rig), self.board_on, self.move
         recording = start_recording(self.folder, rig, self.sizes.board(), board_on)
         if not move:
             return self._guided(recording, rig)
@@ -220,7 +220,12 @@ def calibrate(
     return do()
 
 
-def _rig(name: str) -> "Rig":
+def find_rig(name: str) -> "Rig":
+    """The rig that a function returns: "module:function", or an entry point of the group imop.rigs.
+
+    Raises:
+        InvalidInput: if there is none, or it returns something else.
+    """
     from imop import plugins
     from imop.calibration.collect import Rig
 

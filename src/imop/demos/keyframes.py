@@ -4,9 +4,11 @@ import numpy as np
 
 from imop.errors import InvalidInput
 from imop.geometry.se3 import rotation_distance, translation_distance
-from imop.types import BoolArray, FloatArray, as_finite
+from imop.types import BoolArray, FloatArray, IntArray, as_finite
 
 STOP_BUFFER = 4
+SUDDEN = 5.0
+"""A hand that was so many times as fast within three windows before and after has stopped."""
 
 
 def published_keyframes(
@@ -66,8 +68,8 @@ def pose_keyframes(
 ) -> list[int]:
     """A rule for recordings without joint velocities: from where the gripper was, and when.
 
-    The gripper rests in a frame if its displacement over a `window` around that frame is slower than
-    `at_rest`. A stretch of rest gives one keyframe, its slowest frame. A change of the opening gives one, the
+    The gripper rests where its displacement over a `window` is slower than `at_rest`. A stretch of rest gives
+    one keyframe, the middle of its slowest window. A change of the opening gives one, the
     frame where the fingers have settled; it stands for the rest around it, because arms stand while
     grippers move. The last frame is one. Of consecutive keyframes whose poses are not `apart`, only a
     change of the opening counts, or else the last of them if the episode ends there.
@@ -97,8 +99,7 @@ def pose_keyframes(
         )
     if n < 2:
         return []
-    before, after = _window(t, window)
-    rest = _rests(T, t, before, after, at_rest)
+    rest = _rests(T, t, window, at_rest)
     changes = _opening_changes(opening, t, window, opening_change)
     keyframes = [0]
     for i in sorted({*changes.values(), *_outside(rest, changes), n - 1}):
@@ -111,21 +112,48 @@ def pose_keyframes(
     return keyframes[1:]
 
 
-def _window(t: FloatArray, window: float) -> tuple[list[int], list[int]]:
-    """First and last frame of the window around every frame; at least its neighbours, where it has any."""
-    frames = np.arange(len(t))
+def gripper_states(
+    gripper_opening: FloatArray, times: FloatArray, *, window: float = 0.1, opening_change: float = 0.1
+) -> BoolArray:
+    """(n,) whether the gripper is open: whether its fingers opened or closed last.
+
+    The opening alone does not say it, for fingers that hold something wide are far from closed. Before the
+    first change the gripper is in the other state; if there is none, it is open from half of the stroke on.
+
+    Args:
+        gripper_opening: (n,) 0 closed .. 1 open; measured.
+        times: (n,) seconds, strictly increasing.
+        window: seconds.
+        opening_change: fraction of the stroke.
+
+    Raises:
+        InvalidInput: if the lengths differ or a number is not finite.
+    """
+    opening = as_finite("gripper_opening", gripper_opening, (None,))
+    t = as_finite("times", times, (len(opening),))
+    states = np.full(len(opening), bool(len(opening)) and opening[0] > 0.5)
+    for number, (start, end) in enumerate(_opening_changes(opening, t, window, opening_change).items()):
+        opens = opening[end] > opening[max(start - 1, 0)]
+        if number == 0:
+            states[:start] = not opens
+        states[start:] = opens
+    return states
+
+
+def _windows(t: FloatArray, window: float) -> IntArray:
+    """(n - 1,) last frame of the window that begins at each frame but the last.
+
+    It is no longer than `window`, unless frames are farther apart than that: a hand that turns back stands
+    for a frame or two, and what it does before and after would hide that.
+    """
     # Half a microsecond absorbs rounding: at a fixed rate every window then has equally many frames.
-    before = np.searchsorted(t, t - window / 2 - 5e-7)
-    after = np.searchsorted(t, t + window / 2 + 5e-7, side="right") - 1
-    before = np.maximum(np.minimum(before, frames - 1), 0)
-    after = np.minimum(np.maximum(after, frames + 1), len(t) - 1)
-    return before.tolist(), after.tolist()
+    after = np.searchsorted(t, t[:-1] + window + 5e-7, side="right") - 1
+    return np.maximum(after, np.arange(1, len(t))).astype(np.int32)
 
 
-def _rests(
-    T: FloatArray, t: FloatArray, before: list[int], after: list[int], at_rest: tuple[float, float]
-) -> dict[int, range]:
+def _rests(T: FloatArray, t: FloatArray, window: float, at_rest: tuple[float, float]) -> dict[int, range]:
     """Slowest frame of every stretch of rest -> the stretch."""
+    before, after = np.arange(len(t) - 1), _windows(t, window)
     seconds = t[after] - t[before]
     speed = np.maximum(
         translation_distance(T[before], T[after]) / seconds / at_rest[0],
@@ -133,9 +161,22 @@ def _rests(
     )
     # A stretch ends only at twice the speed that makes it one, so that noise does not cut it into several.
     edges = np.flatnonzero(np.diff(np.concatenate([[False], speed < 2, [False]]).astype(np.int8)))
-    stretches = [range(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
-    slowest = {s[int(np.argmin(speed[s.start : s.stop]))]: s for s in stretches}
-    return {i: s for i, s in slowest.items() if speed[i] < 1}
+    rests = {}
+    for first, end in edges.reshape(-1, 2).tolist():
+        slowest = first + int(np.argmin(speed[first:end]))
+        if speed[slowest] < 1 or _turns_back(speed, t, slowest, window):
+            rests[int(before[slowest] + after[slowest] + 1) // 2] = range(first, int(after[end - 1]) + 1)
+    return rests
+
+
+def _turns_back(speed: FloatArray, t: FloatArray, slowest: int, window: float) -> bool:
+    """Whether a hand that never quite rests was far faster just before and just after.
+
+    Frames that are as far apart as a turn is long see a part of the way to it and a part of the way from it.
+    """
+    first, end = np.searchsorted(t[:-1], (t[slowest] - 3 * window, t[slowest] + 3 * window))
+    fast = speed > SUDDEN * speed[slowest]
+    return bool(np.any(fast[first:slowest]) and np.any(fast[slowest:end]))
 
 
 def _opening_changes(opening: FloatArray, t: FloatArray, window: float, change: float) -> dict[int, int]:
@@ -148,8 +189,10 @@ def _opening_changes(opening: FloatArray, t: FloatArray, window: float, change: 
             start = i
             while i < len(opening) - 1 and abs(opening[later[i]] - opening[i]) > change / 2:
                 i += 1
-            changes[start] = i
-            level = opening[i]
+            # What returns at once was pressed open by what is held, or is noise.
+            if abs(opening[i] - level) > change:
+                changes[start] = i
+                level = opening[i]
         i += 1
     return changes
 

@@ -23,7 +23,8 @@ from imop.setup.setup import (
 from imop.types import FloatArray, as_finite, as_pose
 
 T = TypeVar("T")
-_MISSING = object()
+MISSING = object()
+"""What is taken of a field that is not there."""
 _POSE = "{position = [x, y, z], quaternion = [x, y, z, w]} in metres, or four rows of four numbers"
 _INTRINSICS = "{fx = ..., fy = ..., cx = ..., cy = ...} in pixels, or three rows of three numbers"
 
@@ -40,7 +41,7 @@ def load_setup(path: Path) -> Setup:
     """
     content = read(path, "write one, see docs/real_robot/setup.md").decode(errors="replace")
     try:
-        fields = _format(path).loads(content)
+        fields = file_format(path).loads(content)
     except ValueError as error:
         raise CorruptData(path, f"cannot be read ({error})", "mend what is said there") from error
     return from_dict(fields, path.parent)
@@ -52,7 +53,7 @@ def save_setup(setup: Setup, path: Path) -> None:
     Raises:
         InvalidInput: if the ending is neither .toml nor .json.
     """
-    form, fields = _format(path), to_dict(setup)
+    form, fields = file_format(path), to_dict(setup)
     with replaced(path) as temporary:
         temporary.write_text(_toml(fields) if form is tomllib else json.dumps(fields, indent=2) + "\n")
 
@@ -63,7 +64,7 @@ def from_dict(fields: Mapping[str, Any], folder: Path = Path()) -> Setup:
     Raises:
         InvalidInput: for a field that is missing, unknown or cannot be.
     """
-    top = _Table("", fields)
+    top = Table("", fields)
     robot, workspace = top.table("robot"), top.table("workspace")
     gripper, limits = top.table("gripper", optional=True), top.table("limits", optional=True)
     cameras, parts = top.table("cameras"), top.table("parts", optional=True)
@@ -74,7 +75,10 @@ def from_dict(fields: Mapping[str, Any], folder: Path = Path()) -> Setup:
         {name: _camera(cameras.table(name)) for name in cameras.names()},
         _gripper(gripper) if gripper.names() else None,
         _made(limits, Limits, speed=float, turn=float, joint_speed=float),
-        {name: _made(parts.table(name), Part, size=np.array, T_gripper_part=_pose) for name in parts.names()},
+        {
+            name: _made(parts.table(name), Part, size=np.array, T_gripper_part=read_pose)
+            for name in parts.names()
+        },
     )
     return setup
 
@@ -116,7 +120,7 @@ def to_dict(setup: Setup) -> dict[str, Any]:
     return fields
 
 
-class _Table:
+class Table:
     """A table of the file, whose fields are taken one by one."""
 
     def __init__(self, name: str, fields: Any):
@@ -133,11 +137,11 @@ class _Table:
         return list(self._fields)
 
     def take(self, name: str, read_value: Callable[[Any], T], accepted: str = "") -> Any:
-        """The value of a field, or `_MISSING`."""
+        """The value of a field, or `MISSING`."""
         self._known.append(name)
-        value = self._fields.pop(name, _MISSING)
-        if value is _MISSING:
-            return _MISSING
+        value = self._fields.pop(name, MISSING)
+        if value is MISSING:
+            return MISSING
         try:
             return read_value(value)
         except InvalidInput as error:
@@ -146,13 +150,13 @@ class _Table:
         except (TypeError, ValueError) as error:
             raise InvalidInput(self.field(name), f"{value!r}", accepted or "a number or numbers") from error
 
-    def table(self, name: str, optional: bool = False) -> "_Table":
+    def table(self, name: str, optional: bool = False) -> "Table":
         """The table in a field, empty if it is missing and that is allowed."""
         self._known.append(name)
-        value = self._fields.pop(name, {} if optional else _MISSING)
-        if value is _MISSING:
+        value = self._fields.pop(name, {} if optional else MISSING)
+        if value is MISSING:
             raise InvalidInput(self.field(name), "missing", f"a table [{self.field(name)}]")
-        return _Table(self.field(name), value)
+        return Table(self.field(name), value)
 
     def end(self) -> None:
         """Refuse what nobody took."""
@@ -160,13 +164,13 @@ class _Table:
             raise InvalidInput(self.field(name), "unknown", ", ".join(self._known))
 
 
-def _made(table: _Table, kind: Callable[..., T], **readers: Callable[[Any], Any]) -> T:
+def _made(table: Table, kind: Callable[..., T], **readers: Callable[[Any], Any]) -> T:
     """An object of the fields of a table, without those that are missing."""
     values = {
         name: table.take(name, read_value, _accepted(read_value)) for name, read_value in readers.items()
     }
     table.end()
-    given = {name: value for name, value in values.items() if value is not _MISSING}
+    given = {name: value for name, value in values.items() if value is not MISSING}
     try:
         return kind(**given)
     except InvalidInput as error:
@@ -181,14 +185,14 @@ def _made(table: _Table, kind: Callable[..., T], **readers: Callable[[Any], Any]
         raise InvalidInput(table.field(lacking[0]), "missing", accepted) from error
 
 
-def _robot(table: _Table, folder: Path) -> RobotSetup:
+def _robot(table: Table, folder: Path) -> RobotSetup:
     def model(value: Any) -> str:
-        return str((folder / value).resolve()) if str(value).endswith((".xml", ".urdf")) else _text(value)
+        return str((folder / value).resolve()) if str(value).endswith((".xml", ".urdf")) else read_text(value)
 
-    return _made(table, RobotSetup, model=model, home=np.array, T_world_base=_pose, joints=_names)
+    return _made(table, RobotSetup, model=model, home=np.array, T_world_base=read_pose, joints=read_names)
 
 
-def _gripper(table: _Table) -> GripperSetup:
+def _gripper(table: Table) -> GripperSetup:
     return _made(
         table,
         GripperSetup,
@@ -196,29 +200,29 @@ def _gripper(table: _Table) -> GripperSetup:
         tip=np.array,
         approach=np.array,
         closing=np.array,
-        flange=_text,
+        flange=read_text,
         fingers=dict,
     )
 
 
-def _camera(table: _Table) -> CameraSetup:
+def _camera(table: Table) -> CameraSetup:
     return _made(
         table,
         CameraSetup,
-        intrinsics=_intrinsics,
+        intrinsics=read_intrinsics,
         size=tuple,
-        T_world_camera=_pose,
-        T_gripper_camera=_pose,
-        seen_as=_text,
+        T_world_camera=read_pose,
+        T_gripper_camera=read_pose,
+        seen_as=read_text,
     )
 
 
 def _accepted(read_value: Callable[[Any], Any]) -> str:
     known: dict[Any, str] = {
-        _pose: _POSE,
-        _intrinsics: _INTRINSICS,
-        _text: "a text",
-        _names: "a list of names",
+        read_pose: _POSE,
+        read_intrinsics: _INTRINSICS,
+        read_text: "a text",
+        read_names: "a list of names",
         float: "a number",
         tuple: "[width, height] in pixels",
         np.array: "a list of numbers",
@@ -227,37 +231,57 @@ def _accepted(read_value: Callable[[Any], Any]) -> str:
     return known.get(read_value, "")
 
 
-def _text(value: Any) -> str:
+def read_text(value: Any) -> str:
+    """The value, if it is a text.
+
+    Raises:
+        TypeError: if it is none.
+    """
     if not isinstance(value, str):
         raise TypeError
     return value
 
 
-def _names(value: Any) -> tuple[str, ...]:
+def read_names(value: Any) -> tuple[str, ...]:
+    """The texts of a list.
+
+    Raises:
+        TypeError: if it is none.
+    """
     if not isinstance(value, list):
         raise TypeError
-    return tuple(_text(one) for one in value)
+    return tuple(read_text(one) for one in value)
 
 
-def _pose(value: Any) -> FloatArray:
+def read_pose(value: Any) -> FloatArray:
+    """A pose (4, 4) as files have it: position and quaternion x y z w, or four rows of four numbers.
+
+    Raises:
+        InvalidInput: if it is neither.
+    """
     if not isinstance(value, Mapping):
         return as_pose("pose", value)
-    table = _Table("", value)
+    table = Table("", value)
     position = table.take("position", lambda p: as_finite("position", p, (3,)))
     quaternion = table.take("quaternion", lambda q: as_finite("quaternion", q, (4,)))
     table.end()
-    if position is _MISSING or quaternion is _MISSING:
+    if position is MISSING or quaternion is MISSING:
         raise InvalidInput("pose", f"only {', '.join(value) or 'nothing'}", _POSE)
     return se3.from_pose7(np.concatenate([position, quaternion]))
 
 
-def _intrinsics(value: Any) -> FloatArray:
+def read_intrinsics(value: Any) -> FloatArray:
+    """(3, 3) as files have it: fx, fy, cx and cy in pixels, or three rows of three numbers.
+
+    Raises:
+        InvalidInput: if it is neither.
+    """
     if not isinstance(value, Mapping):
         return as_finite("intrinsics", value, (3, 3))
-    table = _Table("", value)
+    table = Table("", value)
     found = [table.take(name, float, "pixels") for name in ("fx", "fy", "cx", "cy")]
     table.end()
-    if _MISSING in found:
+    if MISSING in found:
         raise InvalidInput("intrinsics", f"only {', '.join(value) or 'nothing'}", _INTRINSICS)
     fx, fy, cx, cy = found
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
@@ -285,10 +309,15 @@ def _plain_camera(camera: CameraSetup) -> dict[str, Any]:
     return fields | ({"seen_as": camera.seen_as} if camera.seen_as else {})
 
 
-def _format(path: Path) -> Any:
+def file_format(path: Path, field: str = "setup") -> Any:
+    """The module, tomllib or json, that reads a file, by its ending.
+
+    Raises:
+        InvalidInput: if it has another one; the error names `field`.
+    """
     found = {".toml": tomllib, ".json": json}.get(path.suffix)
     if found is None:
-        raise InvalidInput("setup", f"{path}", "a file that ends in .toml or .json")
+        raise InvalidInput(field, f"{path}", "a file that ends in .toml or .json")
     return found
 
 

@@ -1,0 +1,1 @@
+"""What people have already becomes demonstrations: bags of ROS, LeRobot's datasets, folders of images."""
