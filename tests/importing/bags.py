@@ -1,4 +1,4 @@
-"""A bag of ROS as rosbags writes it: the take of `tests/recording/takes.py` with clocks, frames and topics."""
+"""A bag of ROS as rosbags writes it: the take of `tests/recording/takes.py` with frames and topics."""
 
 import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
