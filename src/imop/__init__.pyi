@@ -9,6 +9,7 @@ from .policy.learned import LearnedMatcher
 from .policy.one_shot import OneShotPolicy
 from .policy.registration import RegistrationMatcher
 from .policy.router import LearnedRouter
+from .recording.recorder import DemonstrationRecorder
 from .robots.panda import panda_self_filter
 from .setup.file import load_setup, save_setup
 from .setup.setup import Setup
@@ -23,6 +24,7 @@ __all__ = [
     "Action",
     "CameraView",
     "Demonstration",
+    "DemonstrationRecorder",
     "DemonstrationStore",
     "Focus",
     "ImopError",
