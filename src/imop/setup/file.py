@@ -91,6 +91,7 @@ def to_dict(setup: Setup) -> dict[str, Any]:
     }
     if robot.joints:
         fields["robot"]["joints"] = list(robot.joints)
+    fields["robot"] |= _given(robot, "driver", "address")
     if gripper is not None:
         fields["gripper"] = {
             "stroke": gripper.stroke,
@@ -185,7 +186,16 @@ def _robot(table: _Table, folder: Path) -> RobotSetup:
     def model(value: Any) -> str:
         return str((folder / value).resolve()) if str(value).endswith((".xml", ".urdf")) else _text(value)
 
-    return _made(table, RobotSetup, model=model, home=np.array, T_world_base=_pose, joints=_names)
+    return _made(
+        table,
+        RobotSetup,
+        model=model,
+        home=np.array,
+        T_world_base=_pose,
+        joints=_names,
+        driver=_text,
+        address=_text,
+    )
 
 
 def _gripper(table: _Table) -> GripperSetup:
@@ -210,6 +220,8 @@ def _camera(table: _Table) -> CameraSetup:
         T_world_camera=_pose,
         T_gripper_camera=_pose,
         seen_as=_text,
+        driver=_text,
+        serial=_text,
     )
 
 
@@ -282,7 +294,12 @@ def _plain_camera(camera: CameraSetup) -> dict[str, Any]:
     for name in ("T_world_camera", "T_gripper_camera"):
         if getattr(camera, name) is not None:
             fields[name] = pose_fields(getattr(camera, name))
-    return fields | ({"seen_as": camera.seen_as} if camera.seen_as else {})
+    return fields | _given(camera, "seen_as", "driver", "serial")
+
+
+def _given(made: Any, *names: str) -> dict[str, str]:
+    """Texts that are not empty."""
+    return {name: getattr(made, name) for name in names if getattr(made, name)}
 
 
 def _format(path: Path) -> Any:

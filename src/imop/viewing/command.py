@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from imop.errors import InvalidInput
-from imop.files import replaced
-from imop.terminal import console, status
+from imop.files import replaced, writable_folder
+from imop.terminal import console, list_folder, status
+from imop.viewing.scene_of import SceneOf
 
 if TYPE_CHECKING:
     from imop.viewing.cases import Case
@@ -106,3 +107,45 @@ def view(
         console.print(f"{window.url} shows it, until this command is interrupted")
         threading.Event().wait()
     return 0
+
+
+def run_on_robot(
+    file: Path,
+    demo: tuple[Path, int] | None,
+    out: Path,
+    method: str,
+    weights: Path | None,
+    min_confidence: float,
+    scene: SceneOf | None,
+    confirm: bool,
+) -> int:
+    """`imop run --robot FILE`; see `perform_on_robot`."""
+    from rich.markdown import Markdown
+
+    from imop.demos.load import load_demonstration
+    from imop.evaluation.steps import steps_table
+    from imop.viewing.on_robot import perform_on_robot
+
+    if demo is None:
+        raise InvalidInput("demo", "missing", "a store or folder with a demonstration of this set-up")
+    writable_folder(out)
+    with status(f"reading {demo[0]}"):
+        shown = load_demonstration(*demo)
+    origin = {"demo": f"{demo[0]}", "demo_episode": demo[1], "weights": weights and f"{weights}"}
+    result = perform_on_robot(
+        file,
+        shown,
+        out,
+        method,
+        weights,
+        min_confidence,
+        scene,
+        console.input if confirm else None,
+        lambda words: console.print(Markdown(words)),
+        origin,
+    )
+    console.print(steps_table(result))
+    style = "green" if result.success else "red"
+    console.print(f"{file}: {'success' if result.success else 'failed'}: {result.reason}", style=style)
+    list_folder(out)
+    return 0 if result.success else 1
