@@ -24,7 +24,8 @@ from imop.terminal import console, list_folder, status
 from imop.training.ablation import Ablation
 from imop.training.config import TrainConfig
 from imop.training.recipe import RecipeName, make, refuse_others
-from imop.viewing.command import SceneOf, run_on_robot, view
+from imop.viewing.command import run_on_robot, view
+from imop.viewing.scene_of import SceneOf
 
 # Verbs import what they need when they run, so that --help does not wait for torch and MuJoCo.
 
@@ -83,9 +84,9 @@ def run(
         for field, value in {"shown": shown, "change": change, "disturb": disturb}.items():
             if value not in (None, ""):
                 raise InvalidInput(field, f"{value}", "nothing on a robot")
-        scene = None if task is None else SceneOf(task, seed, variation, instance)
-        demonstrated = None if demo is None else (demo, demo_episode)
-        return run_on_robot(Path(robot), demonstrated, out, method, weights, min_confidence, scene, confirm)
+        stands_in = None if task is None else SceneOf(task, seed, variation, instance)
+        read = None if demo is None else (demo, demo_episode)
+        return run_on_robot(Path(robot), read, out, method, weights, min_confidence, stands_in, confirm)
     from imop.demos.load import load_demonstration
     from imop.evaluation.run import perform
     from imop.evaluation.steps import steps_table

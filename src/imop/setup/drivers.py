@@ -71,18 +71,17 @@ def _robot(setup: Setup, scene: SimulatedScene | None, stack: ExitStack) -> Robo
         case "franka":
             from imop.robots.franka import FrankaRobot
 
-            known = gripper is None
-            T_flange_gripper = panda.T_FLANGE_TIP if known else gripper.T_flange_gripper
-            return stack.enter_context(closing(FrankaRobot(robot.address, setup.limits, T_flange_gripper)))
+            T = panda.T_FLANGE_TIP if gripper is None else gripper.T_flange_gripper
+            return stack.enter_context(closing(FrankaRobot(robot.address, setup.limits, T)))
         case "universal_robots":
+            from imop.robots.robotiq import RobotiqGripper
             from imop.robots.universal_robots import UniversalRobot
 
             if gripper is None:
                 accepted = "a file of your arm, and a table [gripper]: imop's has the Panda's hand"
                 raise InvalidInput("robot.model", robot.model, accepted)
-            return stack.enter_context(
-                closing(UniversalRobot(robot.address, setup.limits, gripper.T_flange_gripper))
-            )
+            fingers, T = RobotiqGripper(robot.address), gripper.T_flange_gripper
+            return stack.enter_context(closing(UniversalRobot(robot.address, setup.limits, T, fingers)))
         case "simulated":
             from imop.sim.driver import SimulatedRobot
 

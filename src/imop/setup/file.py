@@ -11,10 +11,10 @@ import numpy as np
 from imop.errors import CorruptData, InvalidInput
 from imop.files import read, replaced
 from imop.geometry import se3
+from imop.robots.limits import Limits
 from imop.setup.setup import (
     CameraSetup,
     GripperSetup,
-    Limits,
     Part,
     RobotSetup,
     Setup,
