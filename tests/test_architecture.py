@@ -42,7 +42,7 @@ ALLOWED = {
 }
 ALLOWED["terminal"] = set()
 ALLOWED["reproduce"] = ALLOWED["evaluation"] | {"evaluation", "terminal"}
-ALLOWED["viewing"] = ALLOWED["reproduce"] | {"cameras", "setup"}
+ALLOWED["viewing"] = ALLOWED["reproduce"] | {"cameras", "setup", "serving"}
 ALLOWED["serving"] = BASE | {"geometry", "demos", "policy", "evaluation", "terminal"}
 
 
