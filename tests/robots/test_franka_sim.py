@@ -70,7 +70,7 @@ def test_a_stop_from_another_thread_ends_the_motion_and_one_can_go_on(robot):
 
 
 def test_what_the_arm_refuses_is_a_result_after_which_one_can_go_on(driver, robot):
-    turned = driver.move_to(se3.make(DOWN @ se3.euler(z=-2.6), (0.45, 0.0, 0.45)))
+    turned = driver.move_to(se3.make(DOWN @ se3.euler(z=2.6), (0.45, 0.0, 0.45)))
     assert not turned.done and turned.reason in ("protective_stop", "not_ready", "not_arrived")
     assert robot.recover().done
     assert robot.move_to(se3.make(DOWN, (0.45, 0.0, 0.4))).done
