@@ -188,7 +188,7 @@ def evaluate(
     jobs: int = 2,
     weights: Path | None = None,
     baselines: Path | None = None,
-    robot: Literal["panda", "iiwa14", "ur5e"] = "panda",
+    robot: Literal["panda", "iiwa", "iiwa14", "ur5e"] = "panda",
     out: Path = Path("runs/eval"),
 ) -> int:
     """Success rates of several methods on the same demonstrations and scenes.

@@ -15,7 +15,7 @@ from imop.calibration.series import BoardPlace, Mount, RigCamera
 from imop.errors import CorruptData, ImopError
 from imop.files import read, replaced
 from imop.geometry import se3
-from imop.setup.file import intrinsics_fields, pose_fields
+from imop.setup.file import intrinsics_fields, intrinsics_of, pose_fields, pose_of
 from imop.types import FloatArray
 
 FORMAT = "imop-calibration"
@@ -150,11 +150,6 @@ def load_calibration(path: Path) -> Calibration:
         raise CorruptData(path, f"not a calibration ({type(error).__name__}: {error})", _REMEDY) from error
 
 
-def pose_of(fields: Mapping[str, Any]) -> FloatArray:
-    """The pose (4, 4) of fields position (metres) and quaternion (x y z w)."""
-    return se3.from_pose7(np.array([*fields["position"], *fields["quaternion"]], dtype=np.float64))
-
-
 def _camera_fields(calibration: Calibration, name: str) -> dict[str, Any]:
     found = calibration.cameras[name]
     camera, K = found.camera, found.camera.intrinsics
@@ -178,10 +173,3 @@ def _camera_of(
         return CalibratedCamera(camera, pose_of(fields["T_gripper_camera"]), quality)
     T = se3.invert(T_world_base) @ pose_of(fields["T_world_camera"])
     return CalibratedCamera(camera, T, quality)
-
-
-def intrinsics_of(fields: Mapping[str, Any]) -> FloatArray:
-    """(3, 3) of fields fx, fy, cx, cy, pixels."""
-    return np.array(
-        [[fields["fx"], 0, fields["cx"]], [0, fields["fy"], fields["cy"]], [0, 0, 1]], dtype=np.float64
-    )

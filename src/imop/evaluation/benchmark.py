@@ -104,7 +104,7 @@ def evaluate_suite(
     trials = suite_trials(suite, split, tasks, episodes, seed, instance, change, instances == "other")
     if robot != PANDA.name and suite == "rlbench":
         raise InvalidInput("robot", f"{robot} in suite {suite}", "panda; other arms in suite tabletop")
-    find_arm(robot)
+    robot = find_arm(robot).name
     trials = {
         task: [
             replace(trial, second_try=second_try, demonstrations=demonstrations, robot=robot)

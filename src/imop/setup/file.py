@@ -74,7 +74,10 @@ def from_dict(fields: Mapping[str, Any], folder: Path = Path()) -> Setup:
         {name: _camera(cameras.table(name)) for name in cameras.names()},
         _gripper(gripper) if gripper.names() else None,
         _made(limits, Limits, speed=float, turn=float, joint_speed=float),
-        {name: _made(parts.table(name), Part, size=np.array, T_gripper_part=_pose) for name in parts.names()},
+        {
+            name: _made(parts.table(name), Part, size=np.array, T_gripper_part=pose_of)
+            for name in parts.names()
+        },
     )
     return setup
 
@@ -191,7 +194,7 @@ def _robot(table: _Table, folder: Path) -> RobotSetup:
         RobotSetup,
         model=model,
         home=np.array,
-        T_world_base=_pose,
+        T_world_base=pose_of,
         joints=_names,
         driver=_text,
         address=_text,
@@ -215,10 +218,10 @@ def _camera(table: _Table) -> CameraSetup:
     return _made(
         table,
         CameraSetup,
-        intrinsics=_intrinsics,
+        intrinsics=intrinsics_of,
         size=tuple,
-        T_world_camera=_pose,
-        T_gripper_camera=_pose,
+        T_world_camera=pose_of,
+        T_gripper_camera=pose_of,
         seen_as=_text,
         driver=_text,
         serial=_text,
@@ -227,8 +230,8 @@ def _camera(table: _Table) -> CameraSetup:
 
 def _accepted(read_value: Callable[[Any], Any]) -> str:
     known: dict[Any, str] = {
-        _pose: _POSE,
-        _intrinsics: _INTRINSICS,
+        pose_of: _POSE,
+        intrinsics_of: _INTRINSICS,
         _text: "a text",
         _names: "a list of names",
         float: "a number",
@@ -251,7 +254,12 @@ def _names(value: Any) -> tuple[str, ...]:
     return tuple(_text(one) for one in value)
 
 
-def _pose(value: Any) -> FloatArray:
+def pose_of(value: Any) -> FloatArray:
+    """The pose (4, 4) of what stands in a file: `pose_fields`, or four rows.
+
+    Raises:
+        InvalidInput: if it is neither.
+    """
     if not isinstance(value, Mapping):
         return as_pose("pose", value)
     table = _Table("", value)
@@ -263,7 +271,12 @@ def _pose(value: Any) -> FloatArray:
     return se3.from_pose7(np.concatenate([position, quaternion]))
 
 
-def _intrinsics(value: Any) -> FloatArray:
+def intrinsics_of(value: Any) -> FloatArray:
+    """(3, 3) of what stands in a file: `intrinsics_fields`, or three rows.
+
+    Raises:
+        InvalidInput: if it is neither.
+    """
     if not isinstance(value, Mapping):
         return as_finite("intrinsics", value, (3, 3))
     table = _Table("", value)

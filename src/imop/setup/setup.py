@@ -14,7 +14,7 @@ from imop.cameras.interfaces import Frame
 from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.geometry.perception import Perception, RobotMask
-from imop.robots import ARMS
+from imop.robots import ARMS, arm_name
 from imop.robots.interfaces import RobotState
 from imop.robots.limits import Limits
 from imop.setup.units import as_angles, as_box, as_direction, as_length, as_place
@@ -49,6 +49,7 @@ class RobotSetup:
     def __post_init__(self) -> None:
         freeze(
             self,
+            model=arm_name(self.model),
             home=as_angles("robot.home", self.home),
             T_world_base=as_place("robot.T_world_base", self.T_world_base),
             joints=tuple(self.joints),
