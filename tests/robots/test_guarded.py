@@ -125,3 +125,14 @@ def test_what_a_driver_raises_is_a_result_but_bad_input_is_bad_input():
         guarded(robot).move_to(seen(0, 0, 1))
     with pytest.raises(InvalidInput, match="opening"):
         guarded(robot).move_gripper(40)
+
+
+def test_an_arm_that_does_not_answer_can_be_recovered():
+    robot = SteppingRobot()
+
+    def silent():
+        raise ConnectionError("nobody is there")
+
+    robot.state = silent
+    assert guarded(robot).move_to(seen(0, 0, 1)).reason == "disconnected" and robot.moves == 0
+    assert guarded(robot).recover().done

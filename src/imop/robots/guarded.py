@@ -74,8 +74,11 @@ class GuardedRobot:
         self._robot.stop()
 
     def recover(self) -> MotionResult:
-        """As `Robot.recover`."""
-        return self._watched(self._robot.recover)
+        """As `Robot.recover`; an arm that does not answer may have to be recovered, so it is not watched."""
+        try:
+            return self._robot.recover()
+        except Exception as error:
+            return _disconnected(error)
 
     def _watched(self, motion: Callable[[], MotionResult]) -> MotionResult:
         """The motion's result, or why it was stopped."""

@@ -5,6 +5,7 @@ The URCap answers lines of text: "SET POS 255" with "ack", "GET POS" with "POS 2
 """
 
 import socket
+import threading
 import time
 from collections.abc import Callable
 
@@ -33,6 +34,8 @@ class RobotiqGripper:
     """
 
     def __init__(self, address: str, port: int = PORT) -> None:
+        # Who watches a motion asks for the opening while the fingers move.
+        self._asking = threading.Lock()
         try:
             self._socket = socket.create_connection((address, port), timeout=2.0)
         except OSError as error:
@@ -81,8 +84,9 @@ class RobotiqGripper:
 
     def _ask(self, line: str) -> str:
         try:
-            self._socket.sendall(f"{line}\n".encode())
-            return self._socket.recv(1024).decode(errors="replace").strip()
+            with self._asking:
+                self._socket.sendall(f"{line}\n".encode())
+                return self._socket.recv(1024).decode(errors="replace").strip()
         except OSError as error:
             raise ConnectionError(f"the gripper does not answer: {error}") from error
 

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 
-from imop.errors import InvalidInput, MissingExtra
+from imop.errors import ImopError, InvalidInput, MissingExtra
 from imop.evaluation.methods import make_policy
 from imop.evaluation.report import save_json
 from imop.evaluation.steps import Rollout, Step
@@ -113,6 +113,9 @@ def perform_on_robot(
                 success, reason = not reason, reason or LAST_STEP
             else:
                 success, reason = aim, "success" if aim else reason or "task not done after the last action"
+        except (ImopError, ConnectionError) as error:
+            reason = f"{error}"
+            raise
         finally:
             result = Rollout(success, reason, tuple(log.steps))
             told = {
