@@ -45,7 +45,7 @@ ALLOWED["terminal"] = set()
 ALLOWED["recording"] = ALLOWED["calibration"] | {"calibration", "tasks"}
 ALLOWED["importing"] = ALLOWED["recording"] | {"recording"}
 ALLOWED["reproduce"] = ALLOWED["evaluation"] | {"evaluation", "terminal"}
-ALLOWED["viewing"] = ALLOWED["reproduce"] | {"cameras", "setup"}
+ALLOWED["viewing"] = ALLOWED["reproduce"] | {"cameras", "setup", "serving"}
 ALLOWED["serving"] = BASE | {"geometry", "demos", "policy", "evaluation", "terminal"}
 
 COMMANDS = ("cli", "cli_baselines", "cli_data", "cli_training")

@@ -1,5 +1,6 @@
 import json
 import re
+from pathlib import Path
 from typing import get_args
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from imop import DemonstrationStore
 from imop.cli import Disturb, main
 from imop.demos.frames import moved
+from imop.evaluation.replay import ReplayPolicy
 from imop.evaluation.trials import Trial, demonstration_for
 from imop.geometry import se3
 from imop.networks.model import load_model
@@ -15,6 +17,7 @@ from imop.robots.panda import T_WORLD_BASE
 from imop.tasks.disturbances import DISTURBANCES
 from imop.training.data.shards import write_shard
 from imop.viewing.cases import from_result
+from tests.serving.running import serving
 from tests.training.data.test_pairs import pair
 
 VERBS = (
@@ -34,6 +37,7 @@ VERBS = (
     "view",
 )
 POT = "tabletop/lid_off_pot"
+CELL = Path(__file__).parents[1] / "examples" / "simulated_cell.toml"
 
 
 def imop(*arguments):
@@ -149,6 +153,19 @@ def test_view_asks_in_the_terminal_and_moves_nothing_before_a_yes(store, monkeyp
     assert "all were rejected" in out and next(answers, None) is None
     for wrong in ((), ("--scene", store), ("--scene", store, "--task", POT)):
         assert imop("view", *wrong) == 2
+
+
+def test_a_server_decides_what_is_viewed_and_what_it_needs_is_said(store, monkeypatch, capsys):
+    monkeypatch.setattr("imop.viewing.command.console.input", lambda question: "q")
+    recording = ("view", "--demo", store, "--scene", store, "--confirm")
+    with serving(ReplayPolicy, key="secret") as server:
+        address = f"127.0.0.1:{server.port}"
+        assert imop(*recording, "--server", address, "--key", "secret") == 1
+        assert "open" in capsys.readouterr().out
+        assert imop(*recording, "--server", address, "--key", "wrong") == 2
+    assert "401" in capsys.readouterr().err
+    assert imop("view", "--robot", CELL) == 2
+    assert "demo" in capsys.readouterr().err
 
 
 def test_predict_takes_recordings_whose_table_is_at_height_0(store, tmp_path, capsys):

@@ -22,9 +22,19 @@ MODULES = {
     "view": ("viser", "websockets"),
     "calibrate": ("cv2",),
     "serve": ("msgpack", "websockets"),
+    "franka": ("franky",),
+    "universal_robots": ("rtde_control", "rtde_receive", "dashboard_client"),
+    "realsense": ("pyrealsense2",),
 }
 # What brings a module of another name.
-DISTRIBUTIONS = {"cv2": "opencv_python_headless"}
+DISTRIBUTIONS = {"cv2": "opencv_python_headless", "rtde_control": "ur_rtde", "rtde_receive": "ur_rtde"}
+DISTRIBUTIONS["dashboard_client"] = "ur_rtde"
+# Modules that need an extra though their package is the base.
+DRIVERS = {
+    "imop.robots.franka": "franka",
+    "imop.robots.universal_robots": "universal_robots",
+    "imop.cameras.realsense": "realsense",
+}
 EVERY = tuple(module for modules in MODULES.values() for module in modules)
 # Imports every module; prints which extra it lacks, or a dash.
 EVERY_MODULE = """
@@ -69,7 +79,7 @@ def base_only() -> dict[str, str]:
     "package", ["cameras", "cli", "demos", "geometry", "networks", "policy", "robots", "types"]
 )
 def test_the_base_is_all_that_a_policy_needs(base_only, package):
-    lacking = {m: e for m, e in base_only.items() if m.split(".")[1] == package}
+    lacking = {m: e for m, e in base_only.items() if m.split(".")[1] == package and m not in DRIVERS}
     assert lacking
     assert set(lacking.values()) == {"-"}
 
@@ -92,6 +102,9 @@ def test_the_base_is_all_that_a_policy_needs(base_only, package):
         ("imop.viewing.draw", "-"),
         ("imop.viewing.simulated", "sim"),
         ("imop.viewing.window", "view"),
+        ("imop.viewing.on_robot", "-"),
+        ("imop.setup.drivers", "-"),
+        *DRIVERS.items(),
     ],
 )
 def test_what_is_beyond_the_base_names_its_extra(base_only, module, extra):
@@ -104,7 +117,8 @@ def test_what_is_beyond_the_base_names_its_extra(base_only, module, extra):
 def test_a_single_missing_module_is_named_with_its_extra(module, extra):
     done = python(EVERY_MODULE, without=(module,))
     assert done.returncode == 0, done.stderr
-    assert {line.split()[1] for line in done.stdout.splitlines()} == {"-", extra}
+    lacking = dict(line.split() for line in done.stdout.splitlines())
+    assert {lacking[name] for name in lacking if name not in DRIVERS} == {"-", extra}
 
 
 def test_extras_bring_the_modules_that_they_are_named_for():

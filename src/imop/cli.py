@@ -29,7 +29,8 @@ from imop.terminal import console, list_folder, status
 from imop.training.ablation import Ablation
 from imop.training.config import TrainConfig
 from imop.training.recipes.recipe import RecipeName, make, refuse_others
-from imop.viewing.command import view
+from imop.viewing.command import run_on_robot, view
+from imop.viewing.scene_of import SceneOf
 
 # Verbs import what they need when they run, so that --help does not wait for torch and MuJoCo.
 
@@ -40,7 +41,7 @@ GROUPS = ("training", "baselines")
 
 @app.command
 def run(
-    task: str,
+    task: str | None = None,
     seed: int = 1,
     variation: int = 0,
     instance: int = 0,
@@ -52,6 +53,8 @@ def run(
     disturb: Disturb = "",
     weights: Path | None = None,
     min_confidence: float = 0.0,
+    robot: str = "panda",
+    confirm: bool = False,
     video: bool = True,
     out: Path = Path("runs/run"),
 ) -> int:
@@ -60,9 +63,12 @@ def run(
     Writes result.json, steps.png (demonstration, region, correspondences, predicted gripper) and rollout.mp4.
     Needs the extras sim and viz.
 
+    With a set-up (--robot CELL.toml --demo DEMO) the robot that it names does it: it looks, decides, moves,
+    until the demonstrated steps are done; docs/real_robot/running.md. Ctrl-C stops the arm.
+
     Args:
         task: suite and name, such as tabletop/lid_off_pot (`imop tasks` lists them), or one's own, such as
-            my_tasks:OpenFridge.
+            my_tasks:OpenFridge. On a robot it is left out, unless the set-up's drivers are simulated.
         seed: scene to perform the task in.
         variation: which variation of the task.
         instance: seed of the objects' shapes, sizes and colours.
@@ -75,18 +81,34 @@ def run(
         disturb: what goes wrong once, as in `imop eval`.
         weights: folder that `imop train` wrote; by default the bundled weights.
         min_confidence: stop instead of acting below this confidence, 0 to 1.
+        robot: a set-up file (.toml or .json), or the arm of the simulation, as in `imop eval`.
+        confirm: ask before every motion; with a set-up.
         video: whether to draw rollout.mp4, which takes longer than the task itself.
         out: folder for the results.
     """
+    if robot.endswith((".toml", ".json")):
+        for field, value in {"shown": shown, "change": change, "disturb": disturb}.items():
+            if value not in (None, ""):
+                raise InvalidInput(field, f"{value}", "nothing on a robot")
+        stands_in = None if task is None else SceneOf(task, seed, variation, instance)
+        read = None if demo is None else (demo, demo_episode)
+        return run_on_robot(Path(robot), read, out, method, weights, min_confidence, stands_in, confirm)
     from imop.demos.load import load_demonstration
-    from imop.evaluation.run import perform, steps_table
+    from imop.evaluation.run import perform
+    from imop.evaluation.steps import steps_table
     from imop.evaluation.trials import Trial, demonstration_for, require_instances
     from imop.tasks.changes import changes_of
     from imop.tasks.suites import find_task
 
+    if task is None:
+        raise InvalidInput("task", "missing", "suite/name, or --robot with a set-up file")
+    if confirm:
+        raise InvalidInput(
+            "confirm", f"with the arm {robot}", "--robot with a set-up file, or imop view --task"
+        )
     writable_folder(out)
     factors = ",".join(changes_of({task: find_task(task)}, change)[task])
-    trial = Trial(task, seed, variation, instance, factors, shown, disturb=disturb)
+    trial = Trial(task, seed, variation, instance, factors, shown, disturb=disturb, robot=robot)
     if shown is not None:
         require_instances(task, "shown", f"{shown}", "nothing")
         if demo is not None:

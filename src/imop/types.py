@@ -128,6 +128,18 @@ def as_fraction(name: str, value: float) -> float:
     return min(max(fraction, 0.0), 1.0)
 
 
+def as_positive(name: str, value: Any, largest: float, unit: str) -> float:
+    """A number above 0 and at most `largest`, which is of that unit.
+
+    Raises:
+        InvalidInput: if it is none.
+    """
+    number = float(as_finite(name, value, ()))
+    if not 0 < number <= largest:
+        raise InvalidInput(name, f"{number:g}", f"above 0 and at most {largest:g}, {unit}")
+    return number
+
+
 def freeze(instance: object, **values: object) -> None:
     """Set fields of a frozen dataclass while it is being made."""
     for name, value in values.items():

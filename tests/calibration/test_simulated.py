@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from imop.calibration.board import Board
-from imop.calibration.clouds import check_robot, check_views, panda_distance
+from imop.calibration.clouds import check_robot, check_views
 from imop.calibration.collect import proposed_poses
 from imop.calibration.detect import board_pose, detect_corners, project
 from imop.calibration.refine import moved
@@ -15,6 +15,7 @@ from imop.calibration.simulated import draw_board, simulated_cell
 from imop.cli import main
 from imop.geometry import se3
 from imop.robots.panda import T_WORLD_BASE
+from imop.setup.arm import known_arm
 from imop.sim.depth_noise import DepthNoise
 from imop.types import CameraView, Observation
 
@@ -118,7 +119,7 @@ def test_depth_images_notice_a_knock_without_a_board(twist):
     views, said = check_views(observations[:1])
     assert [p.kind for p in said] == ["views_disagree"] * knocked
     assert set(views) == {"left", "right"}
-    robot, said = check_robot(observations, panda_distance(T_WORLD_BASE))
+    robot, said = check_robot(observations, known_arm("panda", T_WORLD_BASE).self_filter.distances)
     assert [p.where for p in said] == ["camera left"] * knocked
     assert abs(robot["left"].seen - 1000 * np.linalg.norm(twist)) < 1.5
     assert robot["right"].seen < 1.5

@@ -7,7 +7,7 @@ import pytest
 
 from imop.evaluation.appearance import Appearance
 from imop.evaluation.causes import Cause, _Acted, _first, diagnose, right_poses
-from imop.evaluation.rollout import Rollout, Step
+from imop.evaluation.steps import Rollout, Step
 from imop.evaluation.trials import Trial, demonstration_for
 from imop.geometry import se3
 from imop.tasks.tabletop.close_laptop import CloseLaptop

@@ -4,6 +4,7 @@ import pytest
 from imop.errors import InvalidInput
 from imop.evaluation.methods import make_policy
 from imop.evaluation.robots import perception_for, robot_functions
+from imop.evaluation.trials import Trial
 from imop.geometry import se3
 from imop.robots.panda import PANDA_HOME_Q, T_WORLD_BASE, panda_self_filter
 from imop.setup.file import save_setup
@@ -75,3 +76,9 @@ def test_a_set_up_says_where_the_workspace_and_the_robot_are(tmp_path):
     for x in (0.3, 1.5):
         T = se3.make(np.diag([-1.0, 1, -1]), (x, 0, 1.0))
         assert reachable(away @ T) == here_reached(T)
+
+
+def test_the_iiwa_is_the_iiwa_14_everywhere():
+    home = np.zeros(7)
+    assert Trial("tabletop/open_drawer", 1, robot="iiwa") == Trial("tabletop/open_drawer", 1, robot="iiwa14")
+    assert RobotSetup("iiwa", home).model == "iiwa14" and RobotSetup("iiwa", home).known

@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -5,6 +7,7 @@ from imop.cameras.interfaces import Camera
 from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.robots.interfaces import Robot
+from imop.robots.limits import Limits
 from imop.robots.panda import T_WORLD_BASE
 from imop.sim.cameras import observe
 from imop.sim.driver import SimulatedCamera, SimulatedRobot
@@ -19,7 +22,7 @@ def base(x, y, z):
 
 @pytest.fixture
 def robot() -> SimulatedRobot:
-    return SimulatedRobot(World(scene_spec()), (-0.2, -0.4, 0.76), (0.6, 0.4, 1.6))
+    return SimulatedRobot(World(scene_spec()))
 
 
 def test_it_goes_where_it_is_told_in_the_frame_of_its_base(robot):
@@ -35,7 +38,7 @@ def test_it_goes_where_it_is_told_in_the_frame_of_its_base(robot):
 
 def test_what_cannot_be_done_is_a_reason_and_moves_nothing(robot):
     before = robot.state()
-    for T, reason in ((base(0.3, 0.1, 0.7), "outside_workspace"), (base(0.59, 0.39, 1.59), "unreachable")):
+    for T, reason in ((base(0.3, 0.1, 0.7), "outside_workspace"), (base(0.7, 0.6, 1.7), "unreachable")):
         result = robot.move_to(T)
         assert (result.done, result.reason) == (False, reason)
     np.testing.assert_array_equal(robot.state().joint_positions, before.joint_positions)
@@ -61,6 +64,33 @@ def test_a_stop_ends_the_motion_and_the_next_one_is_done(robot, monkeypatch):
     robot.world.step(300)
     assert se3.near(robot.state().T_base_gripper, halted.T_base_gripper, 0.003, 0.02)
     assert robot.move_to(goal).done
+
+
+def test_it_is_no_faster_than_its_limits_and_says_where_it_is_on_its_way():
+    states, world = [], World(scene_spec())
+    limits = Limits(speed=0.2, turn=0.5, joint_speed=0.4)
+    robot = SimulatedRobot(world, limits, lambda world: states.append(robot.state()))
+    goal = base(0.3, -0.2, 0.9) @ se3.make(se3.euler(z=0.8))
+    assert robot.move_to(goal).done
+    pairs = list(pairwise(states))
+    assert len(pairs) > 20 and all(a.stamp < b.stamp for a, b in pairs)
+    fastest = [
+        max(distance(a, b) / (b.stamp - a.stamp) for a, b in pairs)
+        for distance in (
+            lambda a, b: se3.translation_distance(a.T_base_gripper, b.T_base_gripper),
+            lambda a, b: se3.rotation_distance(a.T_base_gripper, b.T_base_gripper),
+            lambda a, b: np.abs(a.joint_positions - b.joint_positions).max(),
+        )
+    ]
+    shares = np.array(fastest) / (limits.speed, limits.turn, limits.joint_speed)
+    assert 0.9 < shares.max() < 1.1
+
+
+def test_what_may_touch_things_is_done_where_they_stop_it(robot):
+    assert robot.move_to(base(0.3, 0.1, 0.9)).done
+    into_the_table = base(0.3, 0.1, 0.753) @ se3.make(se3.euler(x=0.3))
+    assert robot.move_to(into_the_table).reason == "goal_in_collision"
+    assert robot.move_to(into_the_table, allow_collisions=True).done
 
 
 def test_a_camera_sees_what_observations_show(robot):

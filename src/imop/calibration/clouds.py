@@ -10,7 +10,6 @@ from imop.calibration.problems import Problem
 from imop.calibration.refine import moved
 from imop.geometry import se3
 from imop.geometry.view_alignment import corrected, disagreement, find_errors
-from imop.robots.panda import T_WORLD_BASE, panda_self_filter
 from imop.types import CameraView, FloatArray, Observation
 
 RobotDistance = Callable[[FloatArray, FloatArray, float], FloatArray]
@@ -52,16 +51,6 @@ class Off:
             f"{self.millimetres:.1f} mm and {self.degrees:.2f} degrees off "
             f"(surfaces {self.before:.1f} mm apart, {self.after:.1f} with that)"
         )
-
-
-def panda_distance(T_world_base: FloatArray) -> RobotDistance:
-    """The Panda with its base at a pose (4, 4)."""
-    self_filter, T_filter_world = panda_self_filter(), T_WORLD_BASE @ se3.invert(T_world_base)
-
-    def distance(points: FloatArray, joint_positions: FloatArray, gripper_opening: float) -> FloatArray:
-        return self_filter.distances(se3.apply(T_filter_world, points), joint_positions, gripper_opening)
-
-    return distance
 
 
 def check_views(observations: Sequence[Observation]) -> tuple[dict[str, Off], list[Problem]]:

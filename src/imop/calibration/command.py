@@ -14,11 +14,13 @@ from imop.terminal import console, status, track
 
 if TYPE_CHECKING:
     from imop.calibration.board import Board
+    from imop.calibration.clouds import RobotDistance
     from imop.calibration.collect import Rig
     from imop.calibration.folder import Recording
     from imop.calibration.problems import Problem
     from imop.calibration.result import Calibration
     from imop.calibration.series import Series
+    from imop.setup.setup import Setup
 
 _LEAST, _TRIES = 15, 60
 _LOOKED_AT = 3
@@ -147,8 +149,8 @@ class Solve:
     """with series.json, from `imop calibrate collect` or your own"""
     setup: Path | None = None
     """set-up file that says where the arm's base is; without it the base is the world"""
-    robot: Literal["", "panda"] = ""
-    """whose shape is compared with depth images; by default that of the set-up, if it is known"""
+    robot: Literal["", "panda", "iiwa", "iiwa14", "ur5e"] = ""
+    """whose shape is compared with depth images; by default that of the set-up"""
     out: Path | None = None
     """file for the result; calibration.json in the folder if not given"""
 
@@ -171,8 +173,8 @@ class Solve:
         out = self.out or self.folder / "calibration.json"
         save_calibration(calibration, out)
         _say_quality(calibration)
-        panda = self.robot == "panda" or (setup is not None and setup.robot.model == "panda")
-        problems = [*calibration.problems, *_look(recording, series, calibration, panda)]
+        shape = _shape(self.robot, setup, calibration)
+        problems = [*calibration.problems, *_look(recording, series, calibration, shape)]
         console.print(out)
         return _say(problems)
 
@@ -185,8 +187,10 @@ class Check:
     """with series.json of the new pictures"""
     calibration: Path
     """what `imop calibrate solve` wrote"""
-    robot: Literal["", "panda"] = ""
-    """whose shape is compared with depth images"""
+    setup: Path | None = None
+    """set-up file whose robot's shape is compared with depth images"""
+    robot: Literal["", "panda", "iiwa", "iiwa14", "ur5e"] = ""
+    """the same without a set-up"""
 
     def __call__(self) -> int:
         """Run it."""
@@ -194,7 +198,9 @@ class Check:
         from imop.calibration.knocked import moved_since
         from imop.calibration.problems import NotCalibrated
         from imop.calibration.result import load_calibration
+        from imop.setup.file import load_setup
 
+        setup = None if self.setup is None else load_setup(self.setup)
         calibration, recording = load_calibration(self.calibration), read_recording(self.folder)
         series = recording.series(lambda numbers: track(numbers, "looking for the board"))
         try:
@@ -204,7 +210,8 @@ class Check:
             return _say(error.problems)
         for name, how in moved.items():
             console.print(f"{name}: {how}", soft_wrap=True)
-        return _say([*problems, *_look(recording, series, calibration, self.robot == "panda")])
+        shape = _shape(self.robot, setup, calibration)
+        return _say([*problems, *_look(recording, series, calibration, shape)])
 
 
 def calibrate(
@@ -284,8 +291,22 @@ def _say_quality(calibration: "Calibration") -> None:
             console.print(line, soft_wrap=True)
 
 
+def _shape(robot: str, setup: "Setup | None", calibration: "Calibration") -> "RobotDistance | None":
+    """The arm's surface, of a set-up or by its name; None without either, or if its model is not here."""
+    from imop.errors import MissingExtra
+    from imop.setup.arm import arm_of, known_arm
+
+    try:
+        if robot:
+            return known_arm(robot, calibration.T_world_base).self_filter.distances
+        return None if setup is None else arm_of(setup).self_filter.distances
+    except MissingExtra as error:
+        console.print(f"the robot's shape is not compared: {error}", soft_wrap=True)
+        return None
+
+
 def _look(
-    recording: "Recording", series: "Series", calibration: "Calibration", panda: bool
+    recording: "Recording", series: "Series", calibration: "Calibration", shape: "RobotDistance | None"
 ) -> "list[Problem]":
     """Write overlay pictures, and compare depth images, where there are any."""
     from imop.calibration.overlay import draw_overlay, save_overlay
@@ -298,11 +319,13 @@ def _look(
             path = recording.folder / f"overlay_{name}.png"
             save_overlay(pictures, path)
             console.print(path)
-    return _clouds(recording, calibration, panda)
+    return _clouds(recording, calibration, shape)
 
 
-def _clouds(recording: "Recording", calibration: "Calibration", panda: bool) -> "list[Problem]":
-    from imop.calibration.clouds import check_robot, check_views, panda_distance
+def _clouds(
+    recording: "Recording", calibration: "Calibration", shape: "RobotDistance | None"
+) -> "list[Problem]":
+    from imop.calibration.clouds import check_robot, check_views
 
     observations = recording.observations(calibration)
     observations = observations[:: max(1, len(observations) // _LOOKED_AT)][:_LOOKED_AT]
@@ -313,10 +336,10 @@ def _clouds(recording: "Recording", calibration: "Calibration", panda: bool) -> 
         views, problems = check_views(observations)
     for name, off in views.items():
         console.print(f"{name} against the other views: {off}", soft_wrap=True)
-    if panda:
+    if shape is not None:
         with status("comparing with the robot's shape"):
-            robot, more = check_robot(observations, panda_distance(calibration.T_world_base))
+            robot, more = check_robot(observations, shape)
         for name, off in robot.items():
-            console.print(f"{name} against the shape of the Panda: {off}", soft_wrap=True)
+            console.print(f"{name} against the robot's shape: {off}", soft_wrap=True)
         problems = [*problems, *more]
     return problems

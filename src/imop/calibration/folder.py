@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from imop.calibration.board import Board
 from imop.calibration.detect import detect_corners
-from imop.calibration.result import Calibration, intrinsics_of
+from imop.calibration.result import Calibration
 from imop.calibration.series import BoardPlace, RigCamera, Series, Shot
 from imop.cameras.interfaces import Frame
 from imop.demos.images import read_rgb
@@ -28,7 +28,8 @@ from imop.errors import CorruptData, InvalidInput
 from imop.files import read, replaced
 from imop.geometry import se3
 from imop.robots.interfaces import RobotState
-from imop.setup.file import intrinsics_fields, pose_fields
+from imop.setup.file import intrinsics_fields, pose_fields, read_intrinsics, read_pose
+from imop.setup.units import as_angles
 from imop.types import (
     ByteArray,
     CameraView,
@@ -36,7 +37,6 @@ from imop.types import (
     FloatArray,
     Observation,
     as_finite,
-    as_pose,
     freeze,
 )
 
@@ -46,7 +46,6 @@ DEPTH_STEP = 0.001
 """Metres per step of a depth image."""
 _REMEDY = "see docs/real_robot/calibration.md for the format, or record with `imop calibrate collect`"
 _MOST_RADIANS = 2 * np.pi + 0.01
-_MOST_JOINT = 4 * np.pi
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +225,7 @@ def _parsed(field: str, parse: Callable[[], Any]) -> Any:
 
 def _camera(fields: Mapping[str, Any]) -> RigCamera:
     width, height = fields["size"]
-    K = intrinsics_of(fields["intrinsics"]) if fields.get("intrinsics") else None
+    K = read_intrinsics(fields["intrinsics"]) if fields.get("intrinsics") else None
     return RigCamera(
         fields["mount"], width, height, K, np.array(fields.get("distortion", []), dtype=np.float64)
     )
@@ -248,25 +247,19 @@ def _shot(fields: Mapping[str, Any], cameras: Mapping[str, RigCamera]) -> Record
     for name in (*images, *depth):
         if name not in cameras:
             raise InvalidInput("images", f"of a camera {name}", "one of " + ", ".join(cameras))
-    if q is not None:
-        q = as_finite("joint_positions", q, (None,))
-        if np.abs(q).max(initial=0.0) > _MOST_JOINT:
-            raise InvalidInput("joint_positions", f"{np.abs(q).max():.0f}", "radians, not degrees")
+    q = None if q is None else as_angles("joint_positions", q)
     T = _pose(fields["T_base_gripper"])
     return Recorded(T, images, depth, q, float(fields.get("gripper_opening", 1.0)))
 
 
-def _pose(fields: Mapping[str, Any] | Sequence[Sequence[float]]) -> FloatArray:
-    """A pose as four rows, or as position with quaternion (x y z w) or rotation vector (radians)."""
-    if not isinstance(fields, Mapping):
-        return as_pose("T_base_gripper", fields)
-    if ("quaternion" in fields) == ("rotation_vector" in fields):
-        problem = ", ".join(fields) or "nothing"
-        raise InvalidInput("T_base_gripper", problem, "position, and either quaternion or rotation_vector")
+def _pose(fields: Any) -> FloatArray:
+    """A pose as in set-up files, or as position with a rotation vector (radians)."""
+    if not isinstance(fields, Mapping) or "rotation_vector" not in fields:
+        return read_pose(fields)
+    if set(fields) != {"position", "rotation_vector"}:
+        accepted = "position, and either quaternion or rotation_vector"
+        raise InvalidInput("T_base_gripper", ", ".join(fields), accepted)
     position = as_finite("position", fields["position"], (3,))
-    if "quaternion" in fields:
-        quaternion = as_finite("quaternion", fields["quaternion"], (4,))
-        return se3.from_pose7(np.concatenate([position, quaternion]))
     turn = as_finite("rotation_vector", fields["rotation_vector"], (3,))
     if np.linalg.norm(turn) > _MOST_RADIANS:
         problem = f"a turn by {np.linalg.norm(turn):.0f}"

@@ -15,7 +15,7 @@ from imop.calibration.series import BoardPlace, Mount, RigCamera
 from imop.errors import CorruptData, ImopError
 from imop.files import read, replaced
 from imop.geometry import se3
-from imop.setup.file import intrinsics_fields, pose_fields
+from imop.setup.file import intrinsics_fields, pose_fields, read_intrinsics, read_pose
 from imop.types import FloatArray
 
 FORMAT = "imop-calibration"
@@ -131,7 +131,7 @@ def load_calibration(path: Path) -> Calibration:
         content = json.loads(read(path, _REMEDY))
         if content["format"] != FORMAT or content["version"] != 1:
             raise CorruptData(path, f"not a calibration of version 1 ({content.get('format')})", _REMEDY)
-        T_world_base = pose_of(content["T_world_base"])
+        T_world_base = read_pose(content["T_world_base"])
         cameras = {}
         for name, fields in content["cameras"].items():
             quality = Quality(**content["quality"][name])
@@ -140,7 +140,7 @@ def load_calibration(path: Path) -> Calibration:
             cameras,
             Board(**content["board"]),
             content["board_on"],
-            pose_of(content["T_place_board"]),
+            read_pose(content["T_place_board"]),
             T_world_base,
             [Problem(**problem) for problem in content["problems"]],
         )
@@ -148,11 +148,6 @@ def load_calibration(path: Path) -> Calibration:
         raise
     except (ImopError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise CorruptData(path, f"not a calibration ({type(error).__name__}: {error})", _REMEDY) from error
-
-
-def pose_of(fields: Mapping[str, Any]) -> FloatArray:
-    """The pose (4, 4) of fields position (metres) and quaternion (x y z w)."""
-    return se3.from_pose7(np.array([*fields["position"], *fields["quaternion"]], dtype=np.float64))
 
 
 def _camera_fields(calibration: Calibration, name: str) -> dict[str, Any]:
@@ -173,15 +168,8 @@ def _camera_of(
 ) -> CalibratedCamera:
     mount: Mount = "hand" if "T_gripper_camera" in fields else "world"
     width, height = fields["size"]
-    camera = RigCamera(mount, width, height, intrinsics_of(fields["intrinsics"]), np.array(distortion))
+    camera = RigCamera(mount, width, height, read_intrinsics(fields["intrinsics"]), np.array(distortion))
     if mount == "hand":
-        return CalibratedCamera(camera, pose_of(fields["T_gripper_camera"]), quality)
-    T = se3.invert(T_world_base) @ pose_of(fields["T_world_camera"])
+        return CalibratedCamera(camera, read_pose(fields["T_gripper_camera"]), quality)
+    T = se3.invert(T_world_base) @ read_pose(fields["T_world_camera"])
     return CalibratedCamera(camera, T, quality)
-
-
-def intrinsics_of(fields: Mapping[str, Any]) -> FloatArray:
-    """(3, 3) of fields fx, fy, cx, cy, pixels."""
-    return np.array(
-        [[fields["fx"], 0, fields["cx"]], [0, fields["fy"], fields["cy"]], [0, 0, 1]], dtype=np.float64
-    )

@@ -91,13 +91,13 @@ def _scenes(config: EvaluationConfig) -> dict[str, list[Trial]]:
     c = config
     if c.robot != PANDA.name and c.suite == "rlbench":
         raise InvalidInput("robot", f"{c.robot} in suite {c.suite}", "panda; other arms in suite tabletop")
-    find_arm(c.robot)
+    robot = find_arm(c.robot).name
     trials = suite_trials(
         c.suite, c.split, c.tasks, c.episodes, c.seed, c.instance, c.change, c.instances == "other"
     )
 
     def as_wanted(trial: Trial) -> Trial:
-        return replace(trial, second_try=c.second_try, demonstrations=c.demonstrations, robot=c.robot)
+        return replace(trial, second_try=c.second_try, demonstrations=c.demonstrations, robot=robot)
 
     return {task: list(map(as_wanted, of_task)) for task, of_task in trials.items()}
 

@@ -20,7 +20,8 @@ from imop.evaluation.methods import make_policy
 from imop.evaluation.open_loop import region_shares
 from imop.evaluation.picture import Panel
 from imop.evaluation.recordings import objects_world
-from imop.evaluation.rollout import Rollout, rollout
+from imop.evaluation.rollout import rollout
+from imop.evaluation.steps import Rollout
 from imop.evaluation.trials import Trial, most_actions
 from imop.geometry import se3
 from imop.geometry.accuracy import COARSE, errors

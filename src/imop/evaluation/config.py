@@ -59,5 +59,5 @@ class EvaluationConfig:
     jobs: int = 2
     weights: Path | None = None
     baselines: Path | None = None
-    robot: Literal["panda", "iiwa14", "ur5e"] = "panda"
+    robot: Literal["panda", "iiwa", "iiwa14", "ur5e"] = "panda"
     out: Path = Path("runs/eval")

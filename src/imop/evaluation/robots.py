@@ -9,7 +9,7 @@ from imop import plugins
 from imop.errors import InvalidInput, MissingExtra
 from imop.geometry import se3
 from imop.geometry.perception import Perception, RobotMask
-from imop.robots import ARMS
+from imop.robots import ARMS, arm_name
 from imop.robots.panda import T_WORLD_BASE, panda_self_filter
 from imop.setup.arm import arm_of
 from imop.setup.file import load_setup
@@ -65,6 +65,7 @@ def robot_functions(name: str = PANDA) -> tuple[RobotMask, Reachable | None]:
         InvalidInput: if there is no such robot, or it is none.
         MissingExtra: if the model of one of `SIMULATED` is not installed.
     """
+    name = arm_name(name)
     if name == PANDA:
         return panda_self_filter().is_robot, _panda_reachable()
     if name in SIMULATED:

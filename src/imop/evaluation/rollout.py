@@ -2,58 +2,15 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
 
 from imop.errors import NoConfidentMatch
 from imop.evaluation.methods import Policy
 from imop.evaluation.pointing import Pointing
+from imop.evaluation.steps import Rollout, Step
 from imop.geometry.accuracy import errors
 from imop.policy.one_shot import OneShotPolicy
 from imop.tasks.env import ImopEnv, to_array
 from imop.types import Action, FloatArray, Observation
-
-
-@dataclass(frozen=True)
-class Step:
-    """One action of an episode.
-
-    Attributes:
-        support_step: demonstrated step that was transferred, or None.
-        position_error: metres to where the expert would go from the same state, or None if it has no say; of
-            several poses that look the same the nearest counts.
-        rotation_error: radians, likewise.
-        confidence: the policy's.
-        policy_seconds: time to decide.
-        motion_seconds: time to plan and simulate.
-        plan_failed: reason, if no motion was found.
-        generator: who proposed the motion, see `policy/proposals.py`; empty if nobody competed.
-        reachable: whether the arm can go there; None if that was not asked.
-        disturbed: whether something went wrong after it through no fault of the policy.
-    """
-
-    support_step: int | None
-    position_error: float | None
-    rotation_error: float | None
-    confidence: float
-    policy_seconds: float
-    motion_seconds: float
-    plan_failed: str | None = None
-    generator: str = ""
-    reachable: bool | None = None
-    disturbed: bool = False
-
-
-@dataclass(frozen=True)
-class Rollout:
-    """How an episode went; `reason` says why it ended."""
-
-    success: bool
-    reason: str
-    steps: tuple[Step, ...]
-
-    def as_dict(self) -> dict[str, object]:
-        """Plain values for JSON."""
-        return asdict(self)
 
 
 def rollout(

@@ -4,16 +4,14 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 
-from rich.table import Table
-
 from imop.evaluation.appearance import Appearance
 from imop.evaluation.expert_poses import ExpertPoses
 from imop.evaluation.methods import make_policy
 from imop.evaluation.picture import Panel, save_picture
-from imop.evaluation.predict import deviation
 from imop.evaluation.recordings import objects_world
 from imop.evaluation.report import save_json
-from imop.evaluation.rollout import Rollout, rollout
+from imop.evaluation.rollout import rollout
+from imop.evaluation.steps import Rollout
 from imop.evaluation.trials import Trial, most_actions
 from imop.evaluation.video import save_video
 from imop.sim.cameras import look_at, render_view
@@ -60,7 +58,7 @@ def perform(
         ImopError: if the demonstration or the scene cannot be used.
     """
     env = trial.env()
-    policy = make_policy(method, env.world, min_confidence, weights)
+    policy = make_policy(method, env.world, min_confidence, weights, trial.robot)
     policy.watch(demonstration if method == "oracle" else demonstration.stripped())
     film = _Film()
     env.on_frame = film if video else None
@@ -84,30 +82,3 @@ def perform(
     if film.frames:
         save_video(film.frames, out / "rollout.mp4")
     return result
-
-
-def steps_table(result: Rollout) -> Table:
-    """The steps of an episode for the terminal."""
-    table = Table()
-    columns = (
-        "action",
-        "support step",
-        "proposed by",
-        "probability",
-        "off the expert",
-        "decided in",
-        "moved in",
-    )
-    for column in columns:
-        table.add_column(column, justify="right")
-    for number, step in enumerate(result.steps):
-        table.add_row(
-            str(number),
-            "-" if step.support_step is None else str(step.support_step),
-            step.generator or "-",
-            f"{step.confidence:.2f}" + ("" if step.reachable is not False else ", out of reach"),
-            deviation(step.position_error, step.rotation_error),
-            f"{step.policy_seconds:.2f} s",
-            step.plan_failed or f"{step.motion_seconds:.2f} s",
-        )
-    return table

@@ -14,6 +14,7 @@ from imop.baselines.policy import REGRESSORS
 from imop.errors import ImopError, InvalidInput
 from imop.evaluation.fingerprint import code_digest, own_code_digest
 from imop.evaluation.splits import chosen_tasks
+from imop.robots import arm_name
 from imop.sim.arms import PANDA, find_arm
 from imop.sim.sensing import Sensing
 from imop.tasks.changes import FACTORS, Change, changes_of, read_factors
@@ -72,6 +73,7 @@ class Trial:
         if self.demonstrations < 1:
             raise InvalidInput("demonstrations", f"{self.demonstrations}", "at least 1")
         object.__setattr__(self, "change", ",".join(read_factors(self.change)))
+        object.__setattr__(self, "robot", arm_name(self.robot))
         if self.disturb:
             require_disturbance(self.disturb)
             object.__setattr__(self, "second_try", True)

@@ -80,7 +80,7 @@ DONE = MotionResult(True)
 
 
 class Robot(Protocol):
-    """One arm with a gripper. Only `stop` may be called while another call has not returned.
+    """One arm with a gripper. Only `state` and `stop` may be called while another call has not returned.
 
     A motion returns when the arm rests. It never raises for what goes wrong with the arm, and leaves the
     arm at rest if it is not done.
@@ -102,7 +102,8 @@ class Robot(Protocol):
         Args:
             T_base_gripper: (4, 4), in the frame of the arm's base.
             straight: whether only a straight line of the gripper will do.
-            allow_collisions: whether the arm may touch things; a driver that knows no obstacles ignores it.
+            allow_collisions: whether the arm may touch things, and is done where it is stopped by what it
+                touches; a driver that can tell neither ignores it.
 
         Raises:
             InvalidInput: if the pose is no rigid transformation.

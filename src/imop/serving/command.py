@@ -6,7 +6,9 @@ import os
 import signal
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
 
 from imop.serving.limits import Limits
 from imop.terminal import console, status
@@ -25,7 +27,7 @@ def serve(
     weights: Path | None = None,
     min_confidence: float = 0.0,
     second_try: bool = False,
-    robot: str = "panda",
+    robot: Annotated[str, tyro.conf.arg(aliases=["--setup"])] = "panda",
     host: str = "127.0.0.1",
     port: int = 8000,
     workers: int | None = None,
@@ -50,8 +52,8 @@ def serve(
         min_confidence: answer with an error below this confidence, 0 to 1.
         second_try: what failed is tried again, as in `imop eval`: an observation from which the arm is not
             where it was sent counts as a failed motion.
-        robot: whose points are left out and which poses are reached: panda, or one's own, such as
-            my_robot:MyArm.
+        robot: whose points are left out and which poses are reached: panda, iiwa14, ur5e, a set-up file
+            (.toml or .json), whose workspace then counts too, or one's own, such as my_robot:MyArm.
         host: address to listen at; others than 127.0.0.1 need a key.
         port: to listen at; 0 takes a free one.
         workers: requests that are worked on at once; by default as many as there are cores.

@@ -52,10 +52,19 @@ def arm_of(setup: Setup) -> SetupArm:
         InvalidInput: if the model has no such joint, body or site.
         MissingExtra: for any arm but the Panda without the extra sim, or arms.
     """
-    model = setup.robot.model
-    arm = _panda(setup) if model == "panda" else _simulated(setup) if setup.robot.known else _file(setup)
+    robot = setup.robot
+    arm = known_arm(robot.model, robot.T_world_base, robot.home) if robot.known else _file(setup)
     parts = list(setup.parts.values())
     return replace(arm, self_filter=_with_parts(arm.self_filter, parts, arm.tip_pose))
+
+
+def known_arm(name: str, T_world_base: FloatArray, home: FloatArray | None = None) -> SetupArm:
+    """One of `robots.ARMS` with its base at a pose (4, 4); poses are reached from `home` (J,), if given.
+
+    Raises:
+        MissingExtra: for any arm but the Panda without the extra sim, or arms.
+    """
+    return _panda(T_world_base) if name == "panda" else _simulated(name, T_world_base, home)
 
 
 def _with_parts(self_filter: SelfFilter, parts: list[Part], tip_pose: TipPose) -> SelfFilter:
@@ -65,26 +74,26 @@ def _with_parts(self_filter: SelfFilter, parts: list[Part], tip_pose: TipPose) -
     return self_filter.with_mounted(solids, np.stack([p.T_gripper_part for p in parts]), tip_pose)
 
 
-def _panda(setup: Setup) -> SetupArm:
-    T_base = setup.robot.T_world_base
-    T_setup_imop = T_base @ se3.invert(panda.T_WORLD_BASE)
+def _panda(T_world_base: FloatArray) -> SetupArm:
+    T_world_imop = T_world_base @ se3.invert(panda.T_WORLD_BASE)
     try:
         from imop.sim.kinematics import reachable as reached
 
-        T_imop_setup = se3.invert(T_setup_imop)
-        reachable = lambda T: reached(T_imop_setup @ T)  # noqa: E731
+        T_imop_world = se3.invert(T_world_imop)
+        reachable = lambda T: reached(T_imop_world @ T)  # noqa: E731
     except MissingExtra:
         reachable = None
     limits = panda.JOINT_LOWER, panda.JOINT_UPPER
-    tip_pose = lambda q: np.asarray(T_setup_imop @ panda.tip_pose(q))  # noqa: E731
-    return SetupArm(tip_pose, *limits, panda.panda_self_filter(T_base), reachable)
+    tip_pose = lambda q: np.asarray(T_world_imop @ panda.tip_pose(q))  # noqa: E731
+    return SetupArm(tip_pose, *limits, panda.panda_self_filter(T_world_base), reachable)
 
 
-def _simulated(setup: Setup) -> SetupArm:
+def _simulated(name: str, T_world_base: FloatArray, home: FloatArray | None) -> SetupArm:
     from imop.sim.arms import find_arm, placed, self_filter
 
-    arm = placed(find_arm(setup.robot.model), setup.robot.T_world_base)
-    return _of(setup, arm.kinematics, arm.lower, arm.upper, self_filter(arm))
+    arm = placed(find_arm(name), T_world_base)
+    filtered = self_filter(arm)
+    return _of(arm.home if home is None else home, arm.kinematics, arm.lower, arm.upper, filtered)
 
 
 def _file(setup: Setup) -> SetupArm:
@@ -98,14 +107,14 @@ def _file(setup: Setup) -> SetupArm:
     lower, upper = np.array([_limits(model, name) for name in robot.joints]).T
     place = lower, upper, robot.T_world_base
     kinematics = MinkKinematics(model, robot.joints, _TIP, robot.home, *place)
-    return _of(setup, kinematics, lower, upper, filtered)
+    return _of(robot.home, kinematics, lower, upper, filtered)
 
 
 def _of(
-    setup: Setup, kinematics: Any, lower: FloatArray, upper: FloatArray, self_filter: SelfFilter
+    home: FloatArray, kinematics: Any, lower: FloatArray, upper: FloatArray, self_filter: SelfFilter
 ) -> SetupArm:
     def reachable(T_world_gripper: FloatArray) -> bool:
-        return len(kinematics.inverse(T_world_gripper, setup.robot.home, 1)) > 0
+        return len(kinematics.inverse(T_world_gripper, home, 1)) > 0
 
     return SetupArm(kinematics.tip_pose, lower, upper, self_filter, reachable)
 

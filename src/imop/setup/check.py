@@ -27,17 +27,17 @@ LARGEST, SMALLEST = 4.0, 0.1
 """Edges of a workspace, metres."""
 
 
-def check_setup(setup: Setup, seen: Observation | None = None) -> list[Finding]:
+def check_setup(setup: Setup, seen: Observation | None = None, arm: SetupArm | None = None) -> list[Finding]:
     """Everything that looks wrong.
 
     Args:
         setup: as read from its file.
         seen: an observation of this set-up, in its world frame, to compare it with.
+        arm: of the set-up, if it is known already.
     """
     findings = [*_workspace(setup)]
-    arm: SetupArm | None = None
     try:
-        arm = arm_of(setup)
+        arm = arm or arm_of(setup)
         findings += _home(setup, arm)
     except ImopError as error:
         findings.append(Finding.of(error, "robot.model"))

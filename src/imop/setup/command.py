@@ -1,11 +1,12 @@
 """`imop setup`: says what is wrong with a set-up."""
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Literal
 
 from tyro.conf import Positional
 
-from imop.errors import MissingExtra
+from imop.errors import ImopError, MissingExtra
 from imop.terminal import console, status
 
 
@@ -28,23 +29,25 @@ def setup(
         out: PNG file for the picture; needs --seen and the extra viz.
     """
     from imop.demos.load import load_demonstration
+    from imop.setup.arm import SetupArm, arm_of
     from imop.setup.check import check_setup
     from imop.setup.file import load_setup
 
     found = load_setup(file)
     observation = None if seen is None else load_demonstration(seen, episode).keyframes[0].observation
+    arm: SetupArm | None = None
     with status(f"checking {file}"):
-        findings = check_setup(found, observation)
+        with suppress(ImopError):  # that is a finding
+            arm = arm_of(found)
+        findings = check_setup(found, observation, arm)
     for finding in findings:
         console.print(str(finding), soft_wrap=True)
     errors = sum(finding.severity == "error" for finding in findings)
-    if observation is not None and not any(f.where == "robot.model" for f in findings):
-        from imop.setup.arm import arm_of
-
+    if observation is not None and arm is not None:
         try:
             from imop.setup.picture import draw_filtered
 
-            draw_filtered(found, arm_of(found), observation, out)
+            draw_filtered(found, arm, observation, out)
             console.print(out)
         except MissingExtra as error:
             console.print(f"no picture: {error}")

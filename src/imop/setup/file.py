@@ -11,10 +11,10 @@ import numpy as np
 from imop.errors import CorruptData, InvalidInput
 from imop.files import read, replaced
 from imop.geometry import se3
+from imop.robots.limits import Limits
 from imop.setup.setup import (
     CameraSetup,
     GripperSetup,
-    Limits,
     Part,
     RobotSetup,
     Setup,
@@ -95,6 +95,7 @@ def to_dict(setup: Setup) -> dict[str, Any]:
     }
     if robot.joints:
         fields["robot"]["joints"] = list(robot.joints)
+    fields["robot"] |= _given(robot, "driver", "address")
     if gripper is not None:
         fields["gripper"] = {
             "stroke": gripper.stroke,
@@ -189,7 +190,16 @@ def _robot(table: Table, folder: Path) -> RobotSetup:
     def model(value: Any) -> str:
         return str((folder / value).resolve()) if str(value).endswith((".xml", ".urdf")) else read_text(value)
 
-    return _made(table, RobotSetup, model=model, home=np.array, T_world_base=read_pose, joints=read_names)
+    return _made(
+        table,
+        RobotSetup,
+        model=model,
+        home=np.array,
+        T_world_base=read_pose,
+        joints=read_names,
+        driver=read_text,
+        address=read_text,
+    )
 
 
 def _gripper(table: Table) -> GripperSetup:
@@ -214,6 +224,8 @@ def _camera(table: Table) -> CameraSetup:
         T_world_camera=read_pose,
         T_gripper_camera=read_pose,
         seen_as=read_text,
+        driver=read_text,
+        serial=read_text,
     )
 
 
@@ -306,7 +318,12 @@ def _plain_camera(camera: CameraSetup) -> dict[str, Any]:
     for name in ("T_world_camera", "T_gripper_camera"):
         if getattr(camera, name) is not None:
             fields[name] = pose_fields(getattr(camera, name))
-    return fields | ({"seen_as": camera.seen_as} if camera.seen_as else {})
+    return fields | _given(camera, "seen_as", "driver", "serial")
+
+
+def _given(made: Any, *names: str) -> dict[str, str]:
+    """Texts that are not empty."""
+    return {name: getattr(made, name) for name in names if getattr(made, name)}
 
 
 def file_format(path: Path, field: str = "setup") -> Any:

@@ -14,10 +14,14 @@ from imop.cameras.interfaces import Frame
 from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.geometry.perception import Perception, RobotMask
-from imop.robots import ARMS
+from imop.robots import ARMS, arm_name
 from imop.robots.interfaces import RobotState
-from imop.setup.units import as_angles, as_box, as_direction, as_length, as_place, as_positive
+from imop.robots.limits import Limits
+from imop.setup.units import as_angles, as_box, as_direction, as_length, as_place
 from imop.types import FloatArray, Observation, as_array, as_intrinsics, freeze
+
+ROBOT_DRIVERS = ("franka", "universal_robots", "simulated")
+CAMERA_DRIVERS = ("realsense", "simulated")
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,16 +35,21 @@ class RobotSetup:
         T_world_base: (4, 4), where the model's base stands.
         joints: names of the arm's joints in the model, in the order of the joint positions; needed if the
             model is a file.
+        driver: what moves it, one of `ROBOT_DRIVERS`; empty if imop does not.
+        address: of the arm's controller, such as 192.168.1.10, if the driver needs one.
     """
 
     model: str
     home: FloatArray
     T_world_base: FloatArray = field(default_factory=lambda: np.eye(4))
     joints: tuple[str, ...] = ()
+    driver: str = ""
+    address: str = ""
 
     def __post_init__(self) -> None:
         freeze(
             self,
+            model=arm_name(self.model),
             home=as_angles("robot.home", self.home),
             T_world_base=as_place("robot.T_world_base", self.T_world_base),
             joints=tuple(self.joints),
@@ -53,6 +62,7 @@ class RobotSetup:
         if not self.known and len(self.joints) != len(self.home):
             problem = f"{len(self.joints)} names, but home has {len(self.home)} positions"
             raise InvalidInput("robot.joints", problem, "the name of each joint of the arm, in order")
+        _known_driver("robot.driver", self.driver, ROBOT_DRIVERS)
 
     @property
     def known(self) -> bool:
@@ -137,29 +147,6 @@ class WorkspaceSetup:
 
 
 @dataclass(frozen=True, eq=False)
-class Limits:
-    """How fast the arm may move.
-
-    Attributes:
-        speed: of the gripper, metres per second.
-        turn: of the gripper, radians per second.
-        joint_speed: of every joint, radians per second.
-    """
-
-    speed: float = 0.25
-    turn: float = 1.0
-    joint_speed: float = 1.0
-
-    def __post_init__(self) -> None:
-        freeze(
-            self,
-            speed=as_positive("limits.speed", self.speed, 5.0, "metres per second"),
-            turn=as_positive("limits.turn", self.turn, 10.0, "radians per second"),
-            joint_speed=as_positive("limits.joint_speed", self.joint_speed, 10.0, "radians per second"),
-        )
-
-
-@dataclass(frozen=True, eq=False)
 class CameraSetup:
     """One camera: beside the arm, or mounted on the gripper.
 
@@ -169,6 +156,8 @@ class CameraSetup:
         T_world_camera: (4, 4) if it stands beside the arm, else None. x right, y down, z forward.
         T_gripper_camera: (4, 4) if it moves with the gripper, else None.
         seen_as: what the demonstrations call it, where that is another name than here.
+        driver: what it is read with, one of `CAMERA_DRIVERS`; empty if imop does not read it.
+        serial: number of the camera, by which the driver finds it.
     """
 
     intrinsics: FloatArray
@@ -176,6 +165,8 @@ class CameraSetup:
     T_world_camera: FloatArray | None = None
     T_gripper_camera: FloatArray | None = None
     seen_as: str = ""
+    driver: str = ""
+    serial: str = ""
 
     def __post_init__(self) -> None:
         given = [n for n in ("T_world_camera", "T_gripper_camera") if getattr(self, n) is not None]
@@ -189,6 +180,7 @@ class CameraSetup:
         if not (0 < K[0, 2] < width and 0 < K[1, 2] < height):
             problem = f"({K[0, 2]:g}, {K[1, 2]:g}) is outside of an image of {width} x {height} pixels"
             raise InvalidInput("intrinsics", problem, "cx and cy inside of the image; size is width, height")
+        _known_driver("driver", self.driver, CAMERA_DRIVERS)
         place = as_place(given[0], getattr(self, given[0]))
         freeze(self, intrinsics=K, size=(width, height), **{given[0]: place})
 
@@ -289,6 +281,11 @@ class Setup:
                 raise InvalidInput(f"frames.{name}", f"{width} x {height} pixels", accepted)
             views[camera.seen_as or name] = frames[name].seen_from(camera.pose(T_world_gripper))
         return Observation(views, T_world_gripper, state.gripper_opening, time_step, state.joint_positions)
+
+
+def _known_driver(name: str, driver: str, known: tuple[str, ...]) -> None:
+    if driver and driver not in known:
+        raise InvalidInput(name, driver, f"{', '.join(known)}, or nothing if imop has no driver for it")
 
 
 def _range(name: str, value: tuple[float, float]) -> tuple[float, float]:

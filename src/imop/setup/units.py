@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from imop.errors import InvalidInput
-from imop.types import FloatArray, as_finite, as_pose
+from imop.types import FloatArray, as_finite, as_pose, as_positive
 
 FARTHEST = 10.0
 """A cell is a few metres; a coordinate beyond this is in millimetres."""
@@ -33,14 +33,6 @@ def as_box(name: str, value: Any) -> FloatArray:
 def as_length(name: str, value: Any, longest: float) -> float:
     """A length above 0, metres."""
     return as_positive(name, value, longest, "metres, not millimetres")
-
-
-def as_positive(name: str, value: Any, largest: float, unit: str) -> float:
-    """A number above 0 and at most `largest`."""
-    number = float(as_finite(name, value, ()))
-    if not 0 < number <= largest:
-        raise InvalidInput(name, f"{number:g}", f"above 0 and at most {largest:g}, {unit}")
-    return number
 
 
 def as_angles(name: str, value: Any) -> FloatArray:

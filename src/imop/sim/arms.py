@@ -10,7 +10,7 @@ import numpy as np
 from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.geometry.self_filter import SelfFilter
-from imop.robots import ARMS
+from imop.robots import ARMS, arm_name
 from imop.robots.panda import (
     FILTER_MARGIN,
     JOINT_LOWER,
@@ -90,7 +90,6 @@ PANDA = Arm(
 )
 
 
-@cache
 def find_arm(name: str) -> Arm:
     """The arm of a name.
 
@@ -98,12 +97,16 @@ def find_arm(name: str) -> Arm:
         InvalidInput: if there is none.
         MissingExtra: if its model or mink is not installed.
     """
-    if name == PANDA.name:
-        return PANDA
-    from imop.sim.mounted import MODELS, make_arm
-
-    if name not in MODELS:
+    name = arm_name(name)
+    if name not in ARMS:
         raise InvalidInput("robot", name, ", ".join(ARMS))
+    return PANDA if name == PANDA.name else _mounted(name)
+
+
+@cache
+def _mounted(name: str) -> Arm:
+    from imop.sim.mounted import make_arm
+
     return make_arm(name)
 
 

@@ -1,18 +1,23 @@
 """The simulated arm and cameras behind the interfaces of real ones."""
 
 import threading
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from imop.cameras.interfaces import Frame
-from imop.errors import InvalidInput, PlanFailed
+from imop.errors import PlanFailed
 from imop.geometry import se3
 from imop.robots.interfaces import DONE, MotionResult, RobotState
+from imop.robots.limits import Limits
+from imop.sim.arms import Arm
 from imop.sim.cameras import CAMERAS, Camera, camera_view
 from imop.sim.execute import move, plan_for
-from imop.sim.gripper import set_gripper
+from imop.sim.gripper import OnFrame, set_gripper
+from imop.sim.motion import Trajectory
 from imop.sim.world import World
-from imop.types import FloatArray, as_pose
+from imop.types import FloatArray, as_fraction, as_pose
 
 IMAGE = (128, 128)
 """Width and height by default, pixels."""
@@ -30,59 +35,54 @@ class SimulatedRobot:
 
     Args:
         world: moved by motions.
-        lower, upper: (3,) metres, world frame; the gripper is not sent out of these bounds.
+        limits: how fast it may be; by default as fast as its joints can.
+        on_frame: called with the world every 0.05 simulated seconds of motion.
         seed: of the motion planner.
     """
 
     def __init__(
-        self,
-        world: World,
-        lower: FloatArray | None = None,
-        upper: FloatArray | None = None,
-        seed: int = 0,
+        self, world: World, limits: Limits | None = None, on_frame: OnFrame | None = None, seed: int = 0
     ):
-        self.world, self._seed = world, seed
-        self._lower = np.full(3, -np.inf) if lower is None else np.asarray(lower)
-        self._upper = np.full(3, np.inf) if upper is None else np.asarray(upper)
+        self.world, self._limits, self._on_frame, self._seed = world, limits, on_frame, seed
         self._stop = threading.Event()
+        # What was measured last of an arm that moves: the world changes in the thread that moves it.
+        self._seen: RobotState | None = None
+        self._looking = threading.Lock()
 
     def state(self) -> RobotState:
         """What the arm measures now; the stamp is the simulation's clock."""
-        world = self.world
-        T_base_gripper = se3.invert(world.arm.T_world_base) @ world.T_world_gripper
-        return RobotState(T_base_gripper, world.gripper_opening, world.robot_q, world.time)
+        with self._looking:
+            return self._seen or self._measured()
 
     def move_to(
         self, T_base_gripper: FloatArray, *, straight: bool = False, allow_collisions: bool = False
     ) -> MotionResult:
         """As `Robot.move_to`, with the simulation's own planner, which knows all obstacles."""
         T = self.world.arm.T_world_base @ as_pose("T_base_gripper", T_base_gripper)
-        if np.any(T[:3, 3] < self._lower) or np.any(T[:3, 3] > self._upper):
-            problem = f"{np.round(T[:3, 3], 3).tolist()} m, world frame"
-            return MotionResult(False, "outside_workspace", problem)
-        self._stop.clear()
-        try:
+
+        def go() -> MotionResult:
             trajectory = plan_for(self.world, T, allow_collisions, straight, self._seed)
+            if self._limits is not None:
+                trajectory = slowed(trajectory, self.world.arm, self._limits)
             move(self.world, trajectory, self._watch)
-        except PlanFailed as error:
-            return MotionResult(False, error.reason, str(error))
-        except _Stopped:
-            return self._halted()
-        if not se3.near(self.world.T_world_gripper, T, *_ARRIVED):
-            off = float(se3.translation_distance(self.world.T_world_gripper, T))
-            return MotionResult(False, "not_arrived", f"{off * 1000:.0f} mm away")
-        return DONE
+            if se3.near(self.world.T_world_gripper, T, *_ARRIVED):
+                return DONE
+            off = f"{se3.translation_distance(self.world.T_world_gripper, T) * 1000:.0f} mm away"
+            # What may touch things may be stopped by them: a drawer is open, a button is pressed.
+            touched = MotionResult(True, detail=f"stopped by what it touches, {off}")
+            return touched if allow_collisions else MotionResult(False, "not_arrived", off)
+
+        return self._moved(go)
 
     def move_gripper(self, opening: float) -> MotionResult:
         """As `Robot.move_gripper`."""
-        if not 0.0 <= opening <= 1.0:
-            raise InvalidInput("opening", f"{opening}", "a fraction of the stroke, 0 closed .. 1 open")
-        self._stop.clear()
-        try:
-            set_gripper(self.world, opening > 0.5, self._watch, opening)
-        except _Stopped:
-            return self._halted()
-        return DONE
+        wanted = as_fraction("opening", opening)
+
+        def go() -> MotionResult:
+            set_gripper(self.world, wanted > 0.5, self._watch, wanted)
+            return DONE
+
+        return self._moved(go)
 
     def stop(self) -> None:
         """As `Robot.stop`."""
@@ -92,7 +92,29 @@ class SimulatedRobot:
         """Nothing is ever wrong with a simulated arm."""
         return DONE
 
+    def _moved(self, go: Callable[[], MotionResult]) -> MotionResult:
+        self._stop.clear()
+        with self._looking:
+            self._seen = self._measured()
+        try:
+            return go()
+        except PlanFailed as error:
+            return MotionResult(False, error.reason, str(error))
+        except _Stopped:
+            return self._halted()
+        finally:
+            with self._looking:
+                self._seen = None
+
+    def _measured(self) -> RobotState:
+        world = self.world
+        T_base_gripper = se3.invert(world.arm.T_world_base) @ world.T_world_gripper
+        return RobotState(T_base_gripper, world.gripper_opening, world.robot_q, world.time)
+
     def _watch(self, world: World) -> None:
+        self._seen = self._measured()
+        if self._on_frame is not None:
+            self._on_frame(world)
         if self._stop.is_set():
             raise _Stopped
 
@@ -103,6 +125,17 @@ class SimulatedRobot:
         world.data.ctrl[world.finger_ctrl] = world.data.qpos[world.finger_qpos]
         world.step(_SETTLE_STEPS)
         return MotionResult(False, "stopped", "stop was called")
+
+
+def slowed(trajectory: Trajectory, arm: Arm, limits: Limits) -> Trajectory:
+    """The same way in more time, if it is too fast."""
+    poses = np.stack([arm.kinematics.tip_pose(q) for q in trajectory.positions])
+    seconds = np.diff(trajectory.times)
+    speed = se3.translation_distance(poses[:-1], poses[1:]) / seconds
+    turn = se3.rotation_distance(poses[:-1], poses[1:]) / seconds
+    fastest = speed.max() / limits.speed, turn.max() / limits.turn
+    factor = max(1.0, *fastest, np.abs(trajectory.velocities).max() / limits.joint_speed)
+    return replace(trajectory, times=trajectory.times * factor, velocities=trajectory.velocities / factor)
 
 
 class SimulatedCamera:

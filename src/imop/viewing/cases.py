@@ -121,6 +121,9 @@ def from_result(path: Path) -> Case:
         result = json.loads(read(path))
         weights = None if result["weights"] is None else Path(result["weights"])
         demo = None if result["demo"] is None else (Path(result["demo"]), int(result["demo_episode"]))
+        if "setup" in result:
+            problem = "was done by a robot, and what it saw was not kept"
+            raise InvalidInput("result", problem, "a result.json of a simulated task or of imop predict")
         if demo is not None and "query" in result:
             query = Path(result["query"]), int(result["query_episode"])
             base = None if result["base"] is None else tuple(result["base"])

@@ -12,18 +12,24 @@ from imop.setup.setup import Setup
 from imop.types import Action, FloatArray, Observation
 from imop.viewing.worlds import Outcome, straight
 
+LAST_STEP = "the last step of the demonstration was done"
+
 
 class RobotWorld:
-    """What the drivers of an arm and its cameras say and do. An episode is over when somebody ends it.
+    """What the drivers of an arm and its cameras say and do.
 
     Args:
         setup: says where all of it stands, and where the gripper may go.
-        robot: driver of the arm.
+        robot: driver of the arm, best a guarded one (`setup.drivers.connected`).
         cameras: drivers of all cameras of the set-up, by their names in it.
+        steps: of the demonstration; when its last one was done the episode is over. By default somebody has
+            to end it.
     """
 
-    def __init__(self, setup: Setup, robot: Robot, cameras: Mapping[str, Camera]) -> None:
-        self._setup, self._robot, self._cameras = setup, robot, cameras
+    def __init__(
+        self, setup: Setup, robot: Robot, cameras: Mapping[str, Camera], steps: int | None = None
+    ) -> None:
+        self._setup, self._robot, self._cameras, self._steps = setup, robot, cameras, steps
         self._performed = 0
 
     def observe(self) -> Observation:
@@ -64,10 +70,12 @@ class RobotWorld:
             self._performed += 1
             result = self._robot.move_gripper(float(action.gripper_open))
         if result.done:
-            return Outcome(False)
+            step = self._performed - 1 if action.match is None else action.match.step
+            over = self._steps is not None and step >= self._steps - 1
+            return Outcome(over, LAST_STEP if over else "")
         recovered = self._robot.recover()
         again = "" if recovered.done else f"; it does not recover: {recovered.reason} {recovered.detail}"
-        return Outcome(False, f"not done: {result.reason} {result.detail}{again}")
+        return Outcome(False, f"not done: {result.reason} {result.detail}{again}", result.reason)
 
     def stop(self) -> None:
         """Bring the arm to rest."""

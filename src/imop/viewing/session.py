@@ -23,12 +23,13 @@ class Session:
             the episode is over.
         over: whether the episode has ended.
         words: what happened last, for people.
+        failed: whether what was accepted last was not done.
     """
 
     def __init__(self, decider: Decider, world: World) -> None:
         self._decider, self._world = decider, world
         self.looks: list[Look] = []
-        self.over = False
+        self.over = self.failed = False
         self.words = ""
         decider.reset()
         self.looks.append(self._see(None))
@@ -106,7 +107,7 @@ class Session:
             raise InvalidInput("choice", self.present.problem, "look again, or point at what is meant")
         outcome = self._world.perform(action)
         self._decider.take(self.present.chosen)
-        self.over, self.words = outcome.over, outcome.words
+        self.over, self.words, self.failed = outcome.over, outcome.words, outcome.failed is not None
         if not self.over:
             # What is done must not be done again, even if nothing can be seen now.
             self.looks.append(Look(self.present.scene, problem="nothing was seen since: look again"))

@@ -40,7 +40,8 @@ class SimulatedWorld:
         if info["success"] or (truncated and self._env.wait()):
             return Outcome(True, "done: the task has succeeded")
         if "plan_failed" in info:
-            return Outcome(terminated, f"no motion: {info['plan_failed']}")
+            failed = info["plan_failed"]
+            return Outcome(terminated, f"no motion: {failed}", failed)
         return Outcome(truncated, "not done after the last action" if truncated else "")
 
     def stop(self) -> None:

@@ -15,10 +15,12 @@ class Outcome:
     Attributes:
         over: whether the episode has ended.
         words: what happened, for people; empty if nothing is to be said.
+        failed: why the motion was not done; None if it was.
     """
 
     over: bool
     words: str = ""
+    failed: str | None = None
 
 
 class World(Protocol):
