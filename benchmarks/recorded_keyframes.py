@@ -10,7 +10,6 @@ and 5 degrees of its pose, with the same state of the gripper, in the same order
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import tyro
