@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from imop.demos import unpickle
-from imop.demos.keyframes import pose_keyframes, published_keyframes
+from imop.demos.keyframes import gripper_states, pose_keyframes, published_keyframes
 from imop.errors import InvalidInput
 from imop.geometry import se3
 
@@ -155,6 +155,50 @@ def test_uneven_times_are_respected():
 def test_standing_still_is_one_step():
     n = 50
     assert pose_keyframes(np.tile(np.eye(4), (n, 1, 1)), np.ones(n), 0.05 * np.arange(n)) == [n - 1]
+
+
+def there_and_back(phase, rate=15):
+    """Stand, go 30 cm, turn back at once, go on; every frame `phase` of a period later."""
+    t = (np.arange(4 * rate) + phase) / rate
+    s = lambda begin: np.clip((t - begin) / 1.0, 0, 1)  # noqa: E731
+    jerk = lambda u: 10 * u**3 - 15 * u**4 + 6 * u**5  # noqa: E731
+    x = 0.3 * jerk(s(0.5)) - 0.3 * jerk(s(1.55)) + 0.2 * jerk(s(2.55))
+    T = np.tile(np.eye(4), (len(t), 1, 1))
+    T[:, 0, 3] = x
+    return T, t
+
+
+@given(st.floats(0, 1, exclude_max=True))
+def test_a_hand_that_turns_back_between_frames_is_seen(phase):
+    T, t = there_and_back(phase)
+    found = pose_keyframes(T, np.ones(len(t)), t)
+    assert len(found) == 3
+    assert t[found[0]] == pytest.approx(1.5, abs=0.1) and t[found[1]] == pytest.approx(2.55, abs=0.1)
+
+
+def test_fingers_that_are_pressed_open_for_a_moment_did_nothing():
+    T, opening, t = episode_at(15)
+    whole = pose_keyframes(T, opening, t)
+    pressed = opening.copy()
+    held = int(np.searchsorted(t, 3.0))
+    pressed[held : held + 2] += 0.15
+    assert pose_keyframes(T, pressed, t) == whole
+    np.testing.assert_array_equal(gripper_states(pressed, t), gripper_states(opening, t))
+
+
+@given(st.floats(0.2, 0.85), st.integers(0, 5))
+def test_fingers_that_hold_something_wide_are_closed(width, seed):
+    noise = 0.01 * np.random.default_rng(seed).standard_normal(60)
+    t = np.arange(60) / 15
+    states = gripper_states(np.interp(t, [0, 1, 1.3, 3, 3.3, 4], [1, 1, width, width, 1, 1]) + noise, t)
+    assert states[t < 0.9].all() and not states[(t > 1.3) & (t < 2.9)].any() and states[t > 3.3].all()
+
+
+def test_a_gripper_that_only_opens_was_closed():
+    t = np.arange(30) / 15
+    assert not gripper_states(np.interp(t, [0, 1, 1.2, 2], [0.7, 0.7, 1, 1]), t)[0]
+    assert gripper_states(np.ones(5), np.arange(5.0)).all()
+    assert not gripper_states(np.zeros(5), np.arange(5.0)).any()
 
 
 def test_wrong_input_is_named():

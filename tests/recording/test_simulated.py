@@ -49,6 +49,9 @@ def test_what_was_interrupted_goes_on_and_is_stored_by_the_same_command(take, tm
     for name in read_folder(take[0]).cameras:
         (folder / name).symlink_to(take[0] / name)
     store = ("--store", str(tmp_path / "s.zarr"))
+    other = [part if part != "3" else "4" for part in TASK]
+    code, _, err = run_cli(capsys, "record", str(folder), *other, *store)
+    assert code == 2 and "'seed': 3" in err
     code, out, _ = run_cli(capsys, "record", str(folder), *TASK, *store)
     assert code == 0 and "--save" in out
     assert (folder / FRAMES).read_bytes() == whole

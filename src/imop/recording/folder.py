@@ -12,7 +12,7 @@ frames may then stand in recording.json as well.
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -130,6 +130,7 @@ class RecordedFolder:
         task: for bookkeeping.
         instructions: the task in words.
         kind: how it was shown: kinesthetic, teleoperated, scripted, or anything else.
+        origin: what it is a recording of, as far as a program knows; only the same is continued.
     """
 
     folder: Path
@@ -138,6 +139,7 @@ class RecordedFolder:
     task: str = ""
     instructions: tuple[str, ...] = ()
     kind: str = ""
+    origin: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -193,6 +195,7 @@ class RecordedFolder:
             "task": self.task,
             "instructions": list(self.instructions),
             "kind": self.kind,
+            "origin": dict(self.origin),
             "cameras": {name: _camera_fields(camera) for name, camera in self.cameras.items()},
         }
         with replaced(self.folder / NAME) as temporary:
@@ -238,6 +241,7 @@ def read_folder(folder: Path) -> RecordedFolder:
         str(content.get("task", "")),
         (words,) if isinstance(words, str) else tuple(str(one) for one in words),
         str(content.get("kind", "")),
+        parsed(f"{NAME}: origin", lambda: dict(content.get("origin", {}))),
     )
 
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 
@@ -89,6 +89,7 @@ class DemonstrationRecorder:
         task: str = "",
         instructions: Sequence[str] = (),
         kind: Kind = "kinesthetic",
+        origin: Mapping[str, Any] | None = None,
     ) -> Self:
         """Begin a recording, or go on with one that was interrupted.
 
@@ -98,10 +99,11 @@ class DemonstrationRecorder:
             task: for bookkeeping; no policy reads it.
             instructions: the task in words; no policy but the baselines reads them.
             kind: how it is shown.
+            origin: what is recorded, as plain values, if it could be told from something else.
 
         Raises:
-            InvalidInput: if the folder holds a recording that was stopped, or of other cameras, or cannot be
-                written into.
+            InvalidInput: if the folder holds a recording that was stopped, or of something else or other
+                cameras, or cannot be written into.
             CorruptData: if what it holds cannot be read.
         """
         writable_folder(folder, "folder")
@@ -109,7 +111,8 @@ class DemonstrationRecorder:
         if not is_recording(folder):
             if any(folder.iterdir()):
                 raise InvalidInput("folder", f"{folder} holds something else", "a new or empty folder")
-            recording = RecordedFolder(folder, cameras, (), task, tuple(instructions), kind)
+            words = tuple(instructions)
+            recording = RecordedFolder(folder, cameras, (), task, words, kind, origin or {})
             recording.write()
             return cls(setup, recording)
         if (folder / KEYFRAMES).exists():
@@ -119,6 +122,9 @@ class DemonstrationRecorder:
         if set(recording.cameras) != set(cameras):
             problem = f"{folder} holds a recording of cameras {', '.join(recording.cameras)}"
             raise InvalidInput("folder", problem, f"a new folder for cameras {', '.join(cameras)}")
+        if dict(recording.origin) != dict(origin or {}):
+            problem = f"{folder} holds an interrupted recording of {dict(recording.origin)}"
+            raise InvalidInput("folder", problem, f"a new folder for {dict(origin or {})}")
         # A frame that was being written when the recording was interrupted is not continued.
         if (folder / FRAMES).exists():
             os.truncate(folder / FRAMES, len(whole_lines(folder / FRAMES)))

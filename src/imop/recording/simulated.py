@@ -94,7 +94,15 @@ def record_expert(
     words = made.instructions(variation)
     world = make_scene(made, variation, instance, seed, arm=arm)
     cell = SimulatedCell(world, arm, cameras, size, Noise() if noise is None else noise, seed)
-    recorder = DemonstrationRecorder.start(folder, cell.setup, task=task, instructions=words, kind="scripted")
+    origin = {"robot": robot, "seed": seed, "variation": variation, "instance": instance, "rate": rate}
+    recorder = DemonstrationRecorder.start(
+        folder,
+        cell.setup,
+        task=task,
+        instructions=words,
+        kind="scripted",
+        origin={"simulated": task, **origin},
+    )
     with recorder:
         expert = _play(made, world, rate, lambda number: _add(recorder, cell, number))
     return recorder.stop(), expert
