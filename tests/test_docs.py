@@ -1,0 +1,242 @@
+"""The documentation is true where a machine can tell: links, lines, commands, and code."""
+
+import ast
+import builtins
+import functools
+import importlib
+import inspect
+import re
+import shlex
+import textwrap
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from imop import cli
+from imop.cli import main
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PAGES = sorted([*ROOT.glob("*.md"), *DOCS.rglob("*.md")])
+LONGEST = 110
+
+# Names that the code of a page takes from its reader, and must use.
+GIVEN = {
+    "docs/real_robot/serving.md": {"demonstration", "done", "observation", "robot", "rgb", "depth"}
+    | {"K", "T", "T_world_gripper", "q"},
+    "docs/real_robot/setup.md": {"robot", "cameras"},
+    "docs/real_robot/viewing.md": {"setup", "robot", "cameras", "policy"},
+    "docs/real_robot/calibration.md": {"MyArm", "MyCamera"},
+    "docs/your_own.md": {"policy", "demonstration", "observation", "mask", "p_world"},
+}
+# Pages whose code is run, all blocks of a page one after the other.
+RUN = ("docs/five_minutes.md", "docs/concepts.md")
+# Not ours, and not installed for the tests.
+FOREIGN = ("openpi_client",)
+
+
+def name_of(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+each_page = pytest.mark.parametrize("page", PAGES, ids=name_of)
+
+
+def blocks(page: Path) -> Iterator[tuple[str, str]]:
+    """Language and text of every fenced or indented block of code."""
+    text = page.read_text()
+    for found in re.finditer(r"^( *)```(\w*)[^\n]*\n(.*?)^ *```$", text, flags=re.DOTALL | re.MULTILINE):
+        yield found[2], textwrap.dedent(found[3])
+    without = re.sub(r"^ *```.*?^ *```$", "", text, flags=re.DOTALL | re.MULTILINE)
+    for found in re.finditer(r"(?<=\n\n)(?: {4}[^\n]*\n)+", without):
+        yield "", textwrap.dedent(found[0])
+
+
+def prose(page: Path) -> str:
+    """The text without blocks of code."""
+    return re.sub(r"^ *```.*?^ *```$", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
+
+
+@each_page
+def test_no_line_is_longer_than_a_screen_is_wide(page):
+    long = [f"{number}: {line}" for number, line in enumerate(page.read_text().splitlines(), 1)]
+    assert [line for line in long if len(line.split(": ", 1)[1]) > LONGEST] == []
+
+
+# --- links ------------------------------------------------------------------------------------------------
+
+
+def slug(heading: str) -> str:
+    """The anchor of a heading, as GitHub and mkdocs make it."""
+    plain = re.sub(r"[`*]|\[([^\]]*)\]\([^)]*\)", r"\1", heading).strip().lower()
+    return re.sub(r"[\s]+", "-", re.sub(r"[^\w\s-]", "", plain))
+
+
+def anchors(page: Path) -> set[str]:
+    return {slug(heading) for heading in re.findall(r"^#+ (.*)$", prose(page), flags=re.MULTILINE)}
+
+
+@each_page
+def test_links_lead_somewhere(page):
+    for link in re.findall(r"\]\(([^)\s]+)\)", prose(page)):
+        if re.match(r"\w+:", link):
+            continue
+        path, _, anchor = link.partition("#")
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists(), f"{name_of(page)}: {link}"
+        if anchor:
+            assert anchor in anchors(target), f"{name_of(page)}: {link} has no such heading"
+        if DOCS in page.parents:
+            assert DOCS in target.parents, f"{name_of(page)}: {link} is not part of the site"
+
+
+# --- commands ---------------------------------------------------------------------------------------------
+
+
+def commands(text: str) -> Iterator[list[str]]:
+    """Words of the calls of imop in a block, however they are started; without comments."""
+    for line in text.replace("\\\n", " ").splitlines():
+        if not re.search(r"(^|\s|/)imop(\.cli)? ", line):
+            continue
+        words = shlex.split(line, comments=True)
+        for start, word in enumerate(words):
+            if word.rsplit("/")[-1] in ("imop", "imop.cli") and words[max(0, start - 1)] != "install":
+                yield words[start + 1 :]
+                break
+
+
+@pytest.fixture
+def parsed(monkeypatch):
+    """Calls of `imop` are parsed, and nothing is done."""
+
+    def quiet(function):
+        @functools.wraps(function)
+        def nothing(*_, **__):
+            return 0
+
+        return nothing
+
+    apps = [cli.app, *(import_module(f"imop.cli_{group}").app for group in cli.GROUPS)]
+    for app in apps:
+        monkeypatch.setattr(app, "_subcommands", {n: quiet(f) for n, f in app._subcommands.items()})
+
+
+@each_page
+def test_commands_exist_and_take_these_options(page, parsed, capsys):
+    for _, text in blocks(page):
+        for words in commands(text):
+            with pytest.raises(SystemExit) as ended:
+                main(words)
+            said = capsys.readouterr()
+            assert ended.value.code == 0, f"imop {shlex.join(words)}\n{said.out}{said.err}"
+
+
+def test_a_command_that_does_not_exist_is_noticed(parsed):
+    for wrong in ("run --task a --colour red", "runs", "training genrate", "run --task a --seed one"):
+        with pytest.raises(SystemExit) as ended:
+            main(wrong.split())
+        assert ended.value.code != 0
+
+
+@each_page
+def test_commands_in_sentences_exist(page):
+    known = set(cli.app._subcommands) - set(cli.GROUPS)
+    known |= {
+        f"{group} {name}" for group in cli.GROUPS for name in import_module(f"imop.cli_{group}").app._subcommands
+    }
+    for call in re.findall(r"`imop ([^`]+)`", prose(page)):
+        words = call.split()
+        named = words[0] if words[0] not in cli.GROUPS else " ".join(words[:2])
+        assert named in known | {"--help"} | set(cli.GROUPS), f"{name_of(page)}: imop {call}"
+
+
+@each_page
+def test_scripts_and_files_that_are_named_exist(page):
+    for script in re.findall(r"\b(?:benchmarks|examples|tests|\.ci)/[\w/]+\.\w+", page.read_text()):
+        assert (ROOT / script).exists(), f"{name_of(page)}: {script}"
+
+
+# --- code -------------------------------------------------------------------------------------------------
+
+
+def code(page: Path) -> list[str]:
+    return [text for language, text in blocks(page) if language == "python"]
+
+
+def with_code(names=None):
+    pages = [page for page in PAGES if code(page) and (names is None or name_of(page) in names)]
+    return pytest.mark.parametrize("page", pages, ids=name_of)
+
+
+def test_no_code_hides_in_a_block_without_a_language():
+    for page in PAGES:
+        for language, text in blocks(page):
+            assert language or not re.search(r"^(from|import) \w", text, flags=re.MULTILINE), (page, text)
+
+
+def imported(tree: ast.AST) -> dict[str, object]:
+    """What the import statements of a block bring, by name."""
+    found: dict[str, object] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                if alias.name.split(".")[0] not in FOREIGN:
+                    module = importlib.import_module(alias.name)
+                    found[alias.asname or alias.name] = module
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] not in FOREIGN:
+            module = importlib.import_module(node.module or "")
+            for alias in node.names:
+                found[alias.asname or alias.name] = getattr(module, alias.name)
+    return found
+
+
+def resolved(node: ast.AST, names: dict[str, object]) -> object | None:
+    """The object that an expression such as `Class.method` names, if its root was imported."""
+    if isinstance(node, ast.Name):
+        return names.get(node.id)
+    if isinstance(node, ast.Attribute):
+        owner = resolved(node.value, names)
+        return None if owner is None else getattr(owner, node.attr)
+    return None
+
+
+def bound(tree: ast.AST) -> set[str]:
+    """Every name that a block makes."""
+    made = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    made |= {n.name for n in ast.walk(tree) if isinstance(n, (ast.FunctionDef, ast.ClassDef))}
+    made |= {n.arg for n in ast.walk(tree) if isinstance(n, ast.arg)}
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.Import, ast.ImportFrom)):
+            made |= {(alias.asname or alias.name).split(".")[0] for alias in node.names}
+    return made
+
+
+@with_code()
+def test_code_is_whole_and_what_it_calls_takes_these_arguments(page, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "examples")
+    names: dict[str, object] = {}
+    made, used = set(dir(builtins)) | {"__name__"}, set()
+    for text in code(page):
+        tree = ast.parse(text)
+        names |= imported(tree)
+        made |= bound(tree)
+        used |= {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Attribute):
+                resolved(node, names)
+            if isinstance(node, ast.Call) and callable(called := resolved(node.func, names)):
+                keywords = {k.arg: None for k in node.keywords if k.arg}
+                if not any(isinstance(a, ast.Starred) for a in node.args) and len(keywords) == len(node.keywords):
+                    inspect.signature(called).bind(*node.args, **keywords)
+    given = GIVEN.get(name_of(page), set())
+    assert used - made == given, f"{name_of(page)}: the reader does not have {sorted(used - made - given)}"
+
+
+@with_code(RUN)
+def test_the_code_runs(page, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    space = {"__name__": "__main__"}
+    for text in code(page):
+        exec(compile(text, name_of(page), "exec"), space)
