@@ -32,7 +32,7 @@ GIVEN = {
     "docs/your_own.md": {"policy", "demonstration", "observation", "mask", "p_world"},
 }
 # Pages whose code is run, all blocks of a page one after the other.
-RUN = ("docs/five_minutes.md", "docs/concepts.md")
+RUN = ("docs/five_minutes.md", "docs/concepts.md", "docs/data.md")
 # Not ours, and not installed for the tests.
 FOREIGN = ("openpi_client",)
 
