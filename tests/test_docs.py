@@ -24,7 +24,7 @@ LONGEST = 110
 
 # Names that the code of a page takes from its reader, and must use.
 GIVEN = {
-    "docs/real_robot/serving.md": {"demonstration", "done", "observation", "robot", "rgb", "depth"}
+    "docs/real_robot/serving.md": {"demonstration", "MyPolicy", "done", "observation", "robot", "rgb", "depth"}
     | {"K", "T", "T_world_gripper", "q"},
     "docs/real_robot/setup.md": {"robot", "cameras"},
     "docs/real_robot/viewing.md": {"setup", "robot", "cameras", "policy"},
