@@ -24,7 +24,15 @@ LONGEST = 110
 
 # Names that the code of a page takes from its reader, and must use.
 GIVEN = {
-    "docs/real_robot/serving.md": {"demonstration", "MyPolicy", "done", "observation", "robot", "rgb", "depth"}
+    "docs/real_robot/serving.md": {
+        "demonstration",
+        "MyPolicy",
+        "done",
+        "observation",
+        "robot",
+        "rgb",
+        "depth",
+    }
     | {"K", "T", "T_world_gripper", "q"},
     "docs/real_robot/setup.md": {"robot", "cameras"},
     "docs/real_robot/viewing.md": {"setup", "robot", "cameras", "policy"},
@@ -47,11 +55,16 @@ each_page = pytest.mark.parametrize("page", PAGES, ids=name_of)
 def blocks(page: Path) -> Iterator[tuple[str, str]]:
     """Language and text of every fenced or indented block of code."""
     text = page.read_text()
-    for found in re.finditer(r"^( *)```(\w*)[^\n]*\n(.*?)^ *```$", text, flags=re.DOTALL | re.MULTILINE):
-        yield found[2], textwrap.dedent(found[3])
+    for found in re.finditer(r"^( *)```[{.]*(\w*)[^\n]*\n(.*?)^ *```$", text, flags=re.DOTALL | re.MULTILINE):
+        yield found[2], included(textwrap.dedent(found[3]))
     without = re.sub(r"^ *```.*?^ *```$", "", text, flags=re.DOTALL | re.MULTILINE)
     for found in re.finditer(r"(?<=\n\n)(?: {4}[^\n]*\n)+", without):
         yield "", textwrap.dedent(found[0])
+
+
+def included(text: str) -> str:
+    """The text with the files in it that the site includes."""
+    return re.sub(r'^--8<-- "(.+)"$', lambda found: (ROOT / found[1]).read_text(), text, flags=re.MULTILINE)
 
 
 def prose(page: Path) -> str:
@@ -144,7 +157,9 @@ def test_a_command_that_does_not_exist_is_noticed(parsed):
 def test_commands_in_sentences_exist(page):
     known = set(cli.app._subcommands) - set(cli.GROUPS)
     known |= {
-        f"{group} {name}" for group in cli.GROUPS for name in import_module(f"imop.cli_{group}").app._subcommands
+        f"{group} {name}"
+        for group in cli.GROUPS
+        for name in import_module(f"imop.cli_{group}").app._subcommands
     }
     for call in re.findall(r"`imop ([^`]+)`", prose(page)):
         words = call.split()
@@ -228,7 +243,9 @@ def test_code_is_whole_and_what_it_calls_takes_these_arguments(page, monkeypatch
                 resolved(node, names)
             if isinstance(node, ast.Call) and callable(called := resolved(node.func, names)):
                 keywords = {k.arg: None for k in node.keywords if k.arg}
-                if not any(isinstance(a, ast.Starred) for a in node.args) and len(keywords) == len(node.keywords):
+                if not any(isinstance(a, ast.Starred) for a in node.args) and len(keywords) == len(
+                    node.keywords
+                ):
                     inspect.signature(called).bind(*node.args, **keywords)
     given = GIVEN.get(name_of(page), set())
     assert used - made == given, f"{name_of(page)}: the reader does not have {sorted(used - made - given)}"
