@@ -3,7 +3,7 @@
     python benchmarks/pictures.py --out docs/pictures
 
 `imop run` writes the steps and the video, `imop training regions` the region of recorded demonstrations, and
-`imop training spreads` the spread. Some minutes on two cores.
+`imop training spreads` the spread, `imop tasks` the tasks. Some minutes on two cores.
 """
 
 import argparse
@@ -37,6 +37,12 @@ def save_still(source: Path, path: Path, rows: tuple[float, float] = (0.0, 1.0))
     )
 
 
+def save_photograph(source: Path, path: Path) -> None:
+    """Write a picture of rendered scenes as WebP."""
+    with Image.open(source) as image:
+        image.convert("RGB").save(path, quality=50, method=6)
+
+
 def save_moving(video: Path, path: Path) -> None:
     """Write a video as an animated WebP that stays on its last frame for a while."""
     with av.open(str(video)) as container:
@@ -66,6 +72,8 @@ def main() -> None:
         imop("training", "regions", "--store", store, "--out", regions, "--count", 1)
         save_still(next(regions.glob("*.png")), out / "region.png", (2 / 5, 4 / 5))
         imop("training", "spreads", "--out", out / "spread.png")
+        imop("tasks", "--contact-sheet", Path(folder, "tasks.png"))
+        save_photograph(Path(folder, "tasks.png"), out / "tasks.webp")
 
 
 if __name__ == "__main__":

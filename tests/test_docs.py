@@ -267,3 +267,8 @@ def test_the_code_runs(page, tmp_path, monkeypatch, capsys):
     space = {"__name__": "__main__"}
     for text in code(page):
         exec(compile(text, name_of(page), "exec"), space)
+
+
+def test_pictures_are_small():
+    for picture in (p for p in DOCS.rglob("*") if p.suffix in (".png", ".webp", ".gif", ".jpg")):
+        assert picture.stat().st_size < 150_000, name_of(picture)
