@@ -40,7 +40,7 @@ def save_still(source: Path, path: Path, rows: tuple[float, float] = (0.0, 1.0))
 def save_photograph(source: Path, path: Path) -> None:
     """Write a picture of rendered scenes as WebP."""
     with Image.open(source) as image:
-        image.convert("RGB").save(path, quality=50, method=6)
+        image.convert("RGB").save(path, quality=45, method=6)
 
 
 def save_moving(video: Path, path: Path) -> None:
