@@ -185,6 +185,17 @@ def test_scripts_and_files_that_are_named_exist(page):
         assert (ROOT / script).exists(), f"{name_of(page)}: {script}"
 
 
+def test_the_list_of_folders_is_the_folders():
+    text = (DOCS / "architecture.md").read_text()
+    listed = set(re.findall(r"^\| `([\w/]+)/` \|", text, flags=re.MULTILINE))
+    packages = {
+        path.parent.relative_to(ROOT / "src/imop").as_posix()
+        for path in ROOT.rglob("__init__.py")
+        if ROOT / "src/imop" in path.parent.parents
+    }
+    assert listed == packages
+
+
 # --- code -------------------------------------------------------------------------------------------------
 
 
