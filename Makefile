@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 # One thread per process: two cores are better spent on two processes.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: install demo test coverage lint wheel test-wheel test-lowest lock clean
+.PHONY: install demo test coverage lint docs wheel test-wheel test-lowest lock clean
 
 install: $(STAMP)
 
@@ -29,6 +29,10 @@ lint: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+# The documentation as web pages, in site/; a broken link is an error.
+docs: install
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 # A source archive, and a wheel made from it.
 wheel: install
@@ -55,4 +59,4 @@ lock: install
 	$(BIN)/python -m pip freeze --exclude-editable | grep -v '^-e' | sed 's/+cpu$$//' > constraints.txt
 
 clean:
-	rm -rf $(VENV) build dist src/*.egg-info
+	rm -rf $(VENV) build dist site src/*.egg-info

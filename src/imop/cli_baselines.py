@@ -17,7 +17,7 @@ app = SubcommandApp()
 
 @app.command
 def train(config: Annotated[RegressorConfig, OmitArgPrefixes]) -> int:
-    """Train a regressor on recorded demonstrations; run again, it goes on.
+    """Train a regressor on recorded demonstrations. Run again, the command goes on.
 
     Args:
         config: how to train.
@@ -40,7 +40,7 @@ def adapt(config: Annotated[Fold, OmitArgPrefixes]) -> int:
 
 @app.command
 def hyper(config: Annotated[HyperConfig, OmitArgPrefixes]) -> int:
-    """Train the hyper-network that makes adapters from a demonstration; run again, it goes on.
+    """Train the hyper-network that makes adapters from a demonstration. Run again, the command goes on.
 
     Args:
         config: how to train.

@@ -1,4 +1,4 @@
-"""What networks are trained on, other trainings than `imop train`, pictures of regions (docs/training.md)."""
+"""Make training data, train the verification, merge weights, draw regions (docs/training.md)."""
 
 from pathlib import Path
 from typing import Annotated
@@ -33,7 +33,7 @@ app = SubcommandApp()
 
 @app.command
 def generate(config: Annotated[GenerateConfig, OmitArgPrefixes]) -> int:
-    """Write shards of synthetic pairs or routes; run again, it goes on.
+    """Write shards of synthetic pairs or routes. Run again, the command goes on where it was stopped.
 
     Args:
         config: what is generated.
@@ -44,7 +44,7 @@ def generate(config: Annotated[GenerateConfig, OmitArgPrefixes]) -> int:
 
 @app.command
 def recorded(config: Annotated[RecordedConfig, OmitArgPrefixes]) -> int:
-    """Write shards of pairs from recorded demonstrations, which nobody annotated.
+    """Write shards of pairs from recorded demonstrations. They need no annotation.
 
     Args:
         config: which pairs of which demonstrations.
@@ -55,7 +55,7 @@ def recorded(config: Annotated[RecordedConfig, OmitArgPrefixes]) -> int:
 
 @app.command
 def chains(config: Annotated[ChainConfig, OmitArgPrefixes]) -> int:
-    """Write routes from shards of pairs, without making a single cloud.
+    """Write routes from shards of pairs. No new clouds are made.
 
     Args:
         config: which pairs.
@@ -66,7 +66,7 @@ def chains(config: Annotated[ChainConfig, OmitArgPrefixes]) -> int:
 
 @app.command
 def cases(config: Annotated[CasesConfig, OmitArgPrefixes]) -> int:
-    """Write what the verification network is trained on: candidates of the search, and which are right.
+    """Write cases for the verification network: candidates of the search, and which of them are right.
 
     Args:
         config: how many, of what.
@@ -114,7 +114,7 @@ def merge(config: Annotated[MergeConfig, OmitArgPrefixes]) -> int:
 
 @app.command
 def widen(config: Annotated[Widening, OmitArgPrefixes]) -> int:
-    """Bring weights from before some evidence was known to a verification network that knows it.
+    """Give older weights of the verification network inputs for evidence that they do not know.
 
     Args:
         config: which weights and evidence.
@@ -125,7 +125,7 @@ def widen(config: Annotated[Widening, OmitArgPrefixes]) -> int:
 
 @app.command
 def protocol(config: Annotated[ProtocolConfig, OmitArgPrefixes]) -> int:
-    """Train as the paper does, on 100 demonstrations of each of RLBench's base tasks; run again, it goes on.
+    """Train as the paper does, on 100 demonstrations of each of RLBench's base tasks.
 
     Args:
         config: how much of everything.
@@ -136,7 +136,7 @@ def protocol(config: Annotated[ProtocolConfig, OmitArgPrefixes]) -> int:
 
 @app.command
 def ablations(config: Annotated[AblationsConfig, OmitArgPrefixes]) -> int:
-    """Train every row of the paper's table of ablations equally; run again, it goes on.
+    """Train every row of the paper's table of ablations equally. Run again, the command goes on.
 
     Args:
         config: how the rows are trained.
@@ -147,7 +147,7 @@ def ablations(config: Annotated[AblationsConfig, OmitArgPrefixes]) -> int:
 
 @app.command
 def regions(store: Path, out: Path, count: int = 10) -> int:
-    """Draw the regions and pairs that are found in a store of demonstrations, to look at.
+    """Draw the regions and point pairs that Eq. (3) of the paper finds in a store of demonstrations.
 
     Args:
         store: demonstrations by `imop collect --scenes 3`.
@@ -161,7 +161,7 @@ def regions(store: Path, out: Path, count: int = 10) -> int:
 
 @app.command
 def spreads(config: Annotated[Options, OmitArgPrefixes]) -> int:
-    """Draw how far, as the region network expects, counterparts may lie on other things of the kind.
+    """Draw the spread: how far the region network expects each point's counterpart on other things.
 
     Args:
         config: what is drawn.

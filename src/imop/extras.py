@@ -1,4 +1,4 @@
-"""Optional dependencies: what is not installed is named with the extra that brings it."""
+"""Optional dependencies: the error about a missing one names the extra that brings it."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,7 +8,7 @@ from imop.errors import MissingExtra
 
 @contextmanager
 def extra(name: str) -> Iterator[None]:
-    """Mark imports that belong to an extra, by its name; they stand in this context.
+    """Context for the imports of an extra; if one of them fails, the error names the extra.
 
     Raises:
         MissingExtra: if one of them is not installed.

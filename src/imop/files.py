@@ -1,4 +1,4 @@
-"""Files appear whole or not at all, and what cannot be read is said in one way."""
+"""Files appear whole or not at all, and what cannot be read raises one kind of error."""
 
 import os
 import tempfile

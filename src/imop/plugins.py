@@ -15,7 +15,7 @@ from imop.errors import ImopError, InvalidInput
 
 
 def find(field: str, name: str, group: str) -> Any:
-    """The object of a name, or None if no entry point is called so and it is no "module:object".
+    """The object that a name means; None if it is neither "module:object" nor the name of an entry point.
 
     Args:
         field: what errors call it.

@@ -239,7 +239,7 @@ class Match:
         region: (M, 3) the whole invariant region in the demonstrated scene.
         T_query_support: (4, 4) the motion that carried the demonstrated pose over, world frame to world
             frame; None if none did.
-        generator: who proposed the motion (`policy/proposals.py`); empty if nobody competed.
+        generator: which generator proposed the motion (`policy/proposals.py`); empty if the method has none.
         probability: 0 .. 1, of the motion being right.
     """
 
@@ -269,7 +269,7 @@ class Action:
     """A gripper pose to reach, then the state of the gripper (the paper's a = (T, λ)).
 
     In a demonstration the pose is the one that the gripper *reached* before the fingers moved, not the one
-    that was commanded: what is predicted is carried over from it. A policy's action is a command.
+    that was commanded, because predictions carry the reached pose over. A policy's action is a command.
 
     Attributes:
         T_world_gripper: (4, 4).
@@ -323,7 +323,7 @@ class Keyframe:
 class Demonstration:
     """One successful episode as macro-steps.
 
-    It should end with the release: what is still held at the end was not put anywhere.
+    It should end with the release. What the hand still holds at the end was not put down.
 
     Attributes:
         keyframes: the steps; the state after step k is `after(k)`.

@@ -12,6 +12,7 @@ from imop.reproduce.plot import save_plot
 from imop.reproduce.write import (
     by_task,
     markdown,
+    narrow,
     remarks,
     replace_section,
     summary,
@@ -76,6 +77,21 @@ def test_the_terminal_shows_the_same_cells():
     text = console.export_text()
     (section,) = table(*ROWS).sections
     assert all(cell in text for row in summary(section) for cell in row)
+
+
+def test_a_wide_table_comes_in_parts_that_fit_and_lose_nothing():
+    grid = [["task", *(f"method {n}, published" for n in range(12))]]
+    grid += [[name, *(f"{n}.{n}" for n in range(12))] for name in ("open_drawer", "stack_cubes")]
+    parts = narrow(grid)
+    assert len(parts) > 1
+    assert all(len("| " + " | ".join(row) + " |") <= 110 for part in parts for row in part)
+    assert [sum((part[n][1:] for part in parts), grid[n][:1]) for n in range(3)] == grid
+    assert narrow(grid, width=10_000) == [grid]
+
+
+def test_a_column_wider_than_the_page_stands_alone():
+    grid = [["task", "a" * 200, "b"], ["open_drawer", "1", "2"]]
+    assert narrow(grid) == [[row[:2] for row in grid], [[row[0], row[2]] for row in grid]]
 
 
 def test_a_section_is_replaced_and_the_rest_stays_and_writing_twice_changes_nothing():

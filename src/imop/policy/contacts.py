@@ -41,7 +41,7 @@ class Contacts:
     def taken(self, step: int, steps: Sequence[Transition]) -> FloatArray:
         """(H, 3) points, world frame, that `step` goes to take: the hand moves them after the next grasp.
 
-        None are returned for steps that something is in the hand of, or that leave what they let go before.
+        There are none if the hand holds something in this step, or if the step leaves what was let go before.
         """
         begins = np.flatnonzero(self.holding[step:])
         if not len(begins) or begins[0] == 0:

@@ -1,4 +1,4 @@
-"""What is decided of a scene, and the action that carries a demonstrated one over into it."""
+"""What the policy decides in a scene, and the demonstrated action, carried over into the scene."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ CLEARANCE, MISJUDGED = 0.003, 0.02
 
 @dataclass(frozen=True, eq=False)
 class Decision:
-    """What a policy would do, and what else it might; nothing is done yet.
+    """What a policy would do, and its other candidates; nothing is done yet.
 
     Attributes:
         option: the demonstrated step that is transferred.

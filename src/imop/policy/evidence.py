@@ -2,7 +2,7 @@
 
 Forward, the observed points have to explain the moved region; backward, the region has to explain what was
 observed around it, which tells a thing from a larger one and a front with handles from a back. Nothing is
-decided here: `networks/verification.py` learns what the numbers are worth.
+decided here: `networks/verification.py` learns how much each number counts.
 """
 
 from collections.abc import Iterator, Sequence
@@ -196,7 +196,7 @@ def _claimed(template: Template, surface: Surface, index: NDArray[np.int64], loo
 def palette(template: Template, surface: Surface) -> float:
     """Share 0 .. 1 of the region's colours that are somewhere in the scene, wherever that is.
 
-    Where they are, something in other colours is rather not meant; where they are not, it may be.
+    If the colours are there, a thing in other colours is probably not meant. If they are not, it may be.
     """
     there = _alike(cKDTree(surface.shades[surface.sample]), template.hue[: template.size])
     return float(np.average(there, weights=template.weights[: template.size, 0]))

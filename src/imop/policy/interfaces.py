@@ -39,7 +39,7 @@ class PolicyConfig:
         tight, loose: matches nearer than this to where a motion carries them speak for it, metres.
         next_to: what of the region is this near to where the gripper goes is a part of its own, metres.
         same_motion: motions nearer to each other than this, metres and radians, are judged once.
-        fewest: a thing of fewer points is none, and fits anywhere.
+        fewest: a cluster of fewer points does not count as a thing; it would fit anywhere.
         alone: a part of the region is looked for on its own if it is less than this share of the region.
         known: what the hand takes is told from the rest of the region if the region has this share of it.
         lets_go: share of what is held in the region of a step that lets go from which nothing else is in it.
@@ -166,7 +166,7 @@ class Progress:
     """What an episode did so far.
 
     Attributes:
-        T_last: (4, 4) the motion that was found for the step before, from the demonstrated scene into the
+        T_last: (4, 4) the motion that was found for the step before, from the demonstrated scene to the
             observed one; None at the beginning.
         tried: poses of the step in question that came to nothing before.
     """
@@ -191,7 +191,7 @@ class Candidate:
         probability: 0 .. 1, of being right.
         p_support: (K, 3) points of the region that found a counterpart; none but for the first candidate.
         p_query: (K, 3) the counterparts.
-        generator: who proposed it; see `proposals.py`.
+        generator: which generator proposed it; see `proposals.py`.
         reachable: whether the arm can follow it; None if that was not asked.
     """
 

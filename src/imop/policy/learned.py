@@ -44,8 +44,8 @@ class ShownRegion:
         trust: (N,) of them in a fit to another thing; see `RegionPrediction.trust`.
         inside: (R,) those that are, in order of their index.
         region: the same on the full cloud.
-        completed: (M, 3) points of the region with the things that are mostly in it whole, metres.
-        payload: what the hand takes next, if the region is much more than that. It will move on its own.
+        completed: (M, 3) points of the region, metres. A thing that is mostly in the region is whole.
+        payload: what the hand takes next and moves, if the region is much more than that.
     """
 
     steps: StepBatch
@@ -100,7 +100,7 @@ class LearnedStep:
 
     @property
     def region(self) -> FloatArray:
-        """(M, 3) points of the region in the demonstrated scene, with what is mostly in it completed."""
+        """(M, 3) points of the region in the demonstrated scene; things that lie mostly in it are whole."""
         return self._shown.completed
 
     @property

@@ -106,8 +106,8 @@ class OneShotPolicy:
     def watch(self, demonstration: Demonstration, focus: Focus | None = None) -> None:
         """Take in a demonstration; a further call adds another one.
 
-        Of several, the one is followed whose places are all found again: that of which the least probable is
-        the most probable.
+        An episode fails at its weakest step. So of several demonstrations the policy follows the one whose
+        least probable step is the most probable.
 
         Args:
             demonstration: what was shown.
@@ -143,8 +143,8 @@ class OneShotPolicy:
     def act(self, observation: Observation, focus: Focus | None = None) -> Action:
         """The action for what is seen now, with its confidence and the matched points.
 
-        With `recovers`, a step is tried elsewhere if the arm is not where it was sent, and done again if what
-        it came to has been moved since.
+        With `recovers`, a step is tried elsewhere if the arm is not where it was sent. It is done again if
+        the thing that it led to has been moved since.
 
         Args:
             observation: what is seen.
@@ -161,7 +161,7 @@ class OneShotPolicy:
         return decision.action
 
     def decide(self, observation: Observation, focus: Focus | None = None) -> Decision:
-        """What `act` would do now, and what else might be meant; it may be asked again before it is taken.
+        """What `act` would do now, and its other candidates. Nothing is done until `take` is called.
 
         Raises:
             InvalidInput, NoConfidentMatch: as `act`.
@@ -191,7 +191,7 @@ class OneShotPolicy:
         return replace(decision, action=self._transferred(decision.query, option, candidate))
 
     def take(self, decision: Decision) -> None:
-        """Its action is being performed: the episode goes on from there."""
+        """Let the episode go on from the decision, whose action is being performed."""
         option, action = decision.option, decision.action
         self.router.took(option.demonstration, option.step)
         self._attempts.took(option, action.T_world_gripper)
@@ -252,7 +252,7 @@ class OneShotPolicy:
     def see(
         self, observation: Observation, focus: Focus | None = None, earlier: Scene | None = None
     ) -> Scene:
-        """An observation as the policy works on it: views brought together, fused, without the robot.
+        """The scene that the policy works on: views brought together and fused, without the robot.
 
         Args:
             observation: what is seen.
@@ -294,7 +294,7 @@ class OneShotPolicy:
         return self._decision(query, Option(demonstration, step), progress).action
 
     def steps(self, demonstration: int = 0) -> tuple[tuple[Transition, PreparedStep], ...]:
-        """The steps of a demonstration as they are worked with, and what was found of each, to look at.
+        """The steps of a demonstration as the policy sees them, and what it found of each, to look at.
 
         Raises:
             InvalidInput: if no demonstration of that number was watched.

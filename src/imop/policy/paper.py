@@ -1,7 +1,7 @@
 """The paper's algorithm as it is written: one region, one correspondence matrix, one fit.
 
-No search, no verification, no rule: what stands in section III-C and nothing else. Its distance to `learned`
-is what everything that imop adds is worth. It also runs the paper's ablations, whose networks may regress the
+There is no search, no verification and no rule: this is section III-C and nothing else. The difference to
+`learned` measures what imop adds. It also runs the paper's ablations, whose networks may regress the
 pose instead.
 """
 
@@ -114,7 +114,7 @@ class PaperStep:
 
     @property
     def spread(self) -> None:
-        """Nothing is known of it."""
+        """None: nothing is known of the spread."""
         return None
 
     def locate(

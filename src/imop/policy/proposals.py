@@ -1,4 +1,4 @@
-"""Where the region may have gone: motions that are worth a look, by who proposes them.
+"""Where the region may have gone: motions that are worth a look, by the generators that propose them.
 
 | generator | proposes |
 |---|---|
@@ -79,7 +79,7 @@ class Matches:
     def upright(self, target: Target, places: int, turns: int, middles: Sequence[FloatArray]) -> FloatArray:
         """(H, 4, 4) motions, in every turn, to the things that most of the region was matched to.
 
-        Where something is, the matches say long before they say how it is turned.
+        Matches tell where a thing is more easily than how it is turned.
 
         Args:
             target: of the query.
@@ -126,8 +126,8 @@ def straightened(T: FloatArray, T_straight: FloatArray, p: FloatArray) -> FloatA
 class Turns:
     """Which turn of a region is meant: how shape, colours and their pattern lie in each, among all turns.
 
-    Where a faint mark lies says little of where the region is, but much of its turn. Closest points say
-    nothing of the turn of something round.
+    A faint mark tells little about where the region is, but much about its turn. Closest points tell nothing
+    about the turn of something round.
 
     Args:
         template: of the region.

@@ -1,13 +1,13 @@
-"""What was tried in an episode and came to nothing, by what is observed: there it is looked for last again.
+"""Which actions of an episode failed, as far as it can be observed; the search tries them last.
 
-An action came to nothing if the arm is not where it was sent, or if the router goes back to its step or to
-one before it. What the arm cannot do, it cannot do a moment later. What it did and what then failed may have
-been right all the same, so its probability falls by Bayes' rule only.
+An action failed if the arm is not where it was sent, or if the router goes back to its step or to one before
+it. What the arm cannot do, it cannot do a moment later either. An action that was carried out and then failed
+may have been right all the same, so its probability falls by Bayes' rule only.
 
-Two steps that follow each other are often fixed to the same place of what stands there: come near, then
-close. Their motions are one, then. If the second is found elsewhere, the thing was moved or the first was
-wrong, and in either case the first has to be done again. What is in the hand stays in it, so this says
-something only of steps that leave the hand empty.
+Two steps that follow each other are often fixed to the same place of a thing: come near, then close. Then
+their motions are the same. If the second is found elsewhere, the thing was moved or the first was
+wrong, and in either case the first has to be done again. This says something
+only about steps that leave the hand empty, because what is in the hand stays in it.
 """
 
 from collections import defaultdict

@@ -1,8 +1,8 @@
 """The region that a demonstrated step is fixed to, found without labels.
 
-What a step refers to shows in where the gripper goes and in what moves with it. An approach refers to the
-thing that the gripper will close on next, a transport to the thing that the held object is set down at, a
-retreat to the thing just left. The region is the whole cluster around that contact: small patches are
+Two things show what a step refers to: where the gripper goes, and what moves with it. An approach refers to
+the thing that the gripper will close on next, a transport to the thing that the held object is set down at,
+a retreat to the thing just left. The region is the whole cluster around that contact: small patches are
 repeated too often to be found again (a drawer's handle looks like the other drawers').
 """
 

@@ -1,7 +1,7 @@
 """The matcher without learned matches: regions by rules, point feature histograms, the same search.
 
-Of the networks only the verification is asked. What `learned` does better than this is what the region and
-matching networks are worth.
+Of the networks only the verification is asked. The difference to `learned` measures what the region and
+matching networks add.
 """
 
 from collections.abc import Sequence
@@ -82,7 +82,7 @@ class RegisteredStep:
 
     @property
     def spread(self) -> None:
-        """Nothing is known of it."""
+        """None: nothing is known of the spread."""
         return None
 
     def locate(

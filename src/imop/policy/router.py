@@ -1,9 +1,8 @@
 """Which demonstrated step the present state corresponds to.
 
-`AdvancingRouter` takes one step after the other. `LearnedRouter` weighs what the routing network says of what
-is seen with what was done so far. The network is told which step comes
-next if every action so far did what was demonstrated, and sees what the last action changed. What else the
-episode says enters as odds:
+`AdvancingRouter` takes one step after the other. `LearnedRouter` weighs what the routing network says with
+what was done so far. The network is told which step comes next if every action so far did what was
+demonstrated, and sees what the last action changed. Everything else that the episode says enters as odds:
 
 - the step after the one taken last: 1;
 - a step before that, since an action can fail: `back`;
@@ -80,7 +79,7 @@ class Router(Protocol):
 class AdvancingRouter:
     """Goes through one demonstration step by step and then stays at its last.
 
-    Which one, the first step decides.
+    Of several demonstrations, the first step decides which one it follows.
     """
 
     def __init__(self) -> None:

@@ -1,7 +1,7 @@
 """Candidates of one step in one scene: refined, verified by evidence, and ranked by their probability.
 
-The verification network, which learned what the evidence of each candidate and of its rivals is worth, makes
-probabilities of it (`networks/verification.py`).
+The verification network turns the evidence of each candidate and of its rivals into probabilities
+(`networks/verification.py`).
 """
 
 from collections.abc import Sequence

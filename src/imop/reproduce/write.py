@@ -25,6 +25,8 @@ from imop.reproduce.table import ARROW
 Grid = list[list[str]]
 """Header and rows of cells."""
 
+WIDTH = 110
+"""Characters in a line of a document."""
 _NOTHING = "-"
 _END = "<!-- end -->"
 
@@ -90,19 +92,40 @@ def remarks(measured: Measured) -> list[str]:
 
 
 def _body(measured: Measured, heading: str) -> list[str]:
-    lines = [f"    {measured.command}", "", origin(measured)]
+    lines = [f"    {measured.command}", "", *wrap(origin(measured), WIDTH)]
     for section in measured.sections:
         lines += ["", f"{heading} {section.title}"]
         if section.rows and all(row.missing == NOT_YET for row in section.rows):
-            lines += ["", *wrap(f"Not measured yet: {'; '.join(row.label for row in section.rows)}.", 110)]
+            lines += ["", *wrap(f"Not measured yet: {'; '.join(row.label for row in section.rows)}.", WIDTH)]
             section = replace(section, rows=())
-        for head, *rows in grids(section, measured.columns):
-            lines += ["", *markdown_table(head, rows)]
+        for grid in grids(section, measured.columns):
+            for head, *rows in narrow(grid):
+                lines += ["", *markdown_table(head, rows)]
     return [*lines, "", *(line for remark in remarks(measured) for line in _item(remark))]
 
 
+def narrow(grid: Grid, width: int = WIDTH) -> list[Grid]:
+    """The same table in as few parts as fit into `width`, each with the first column; no column is split."""
+    first, *others = (list(column) for column in zip(*grid, strict=True))
+    parts = [[first]]
+    for column in others:
+        part = [*parts[-1], column]
+        if len(parts[-1]) > 1 and max(_written(row) for row in zip(*part, strict=True)) > width:
+            part = [first, column]
+            parts.append(part)
+        parts[-1] = part
+    return [[list(row) for row in zip(*part, strict=True)] for part in parts]
+
+
+def _written(row: Sequence[str]) -> int:
+    """Characters of a row of `markdown_table`."""
+    return sum(len(cell) + 3 for cell in row) + 1
+
+
 def _item(sentence: str) -> list[str]:
-    return wrap(f"- {sentence}", 110, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    return wrap(
+        f"- {sentence}", WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
+    )
 
 
 def origin(measured: Measured) -> str:

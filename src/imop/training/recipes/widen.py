@@ -25,7 +25,7 @@ class Widening:
     Attributes:
         weights: folder of the former weights.
         out: folder of the new ones.
-        new: names of `networks.verification.EVIDENCE` that the former ones do not know.
+        new: names of `networks.verification.EVIDENCE` that the former weights do not know.
         seed: of the weights of the new evidence.
     """
 

@@ -27,7 +27,7 @@ class GenerateConfig:
         routes: number of routes, for the routing network.
         seed: with a shard's number and size it determines the content.
         jobs: worker processes.
-        held_out: whether of the families for testing only.
+        held_out: whether the scenes are made of the families that are for testing only.
         families: that the scenes are made of; all if none is named.
         mix: shares of pairs whose query shows the same things, others in colour, in shape, in both.
         kinds: of what is done in pairs (`plans.SHARES`); all if none is named.

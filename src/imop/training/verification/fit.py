@@ -40,7 +40,7 @@ class VerificationTraining:
         out: folder of the weights, with all other networks as they were.
         weights: folder of the other networks.
         further: whether the verification network of that folder is trained on, instead of a fresh one.
-        only: evidence that is new to it: nothing is trained but how it enters the network.
+        only: evidence that is new to the network; nothing is trained but how this evidence enters it.
         held: share of the cases that are kept for the report.
         steps: of AdamW.
         batch: candidates' cases per step.
