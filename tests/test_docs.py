@@ -27,6 +27,7 @@ GIVEN = {
     "docs/real_robot/calibration.md": "MyArm MyCamera",
     "docs/real_robot/serving.md": "demonstration observation done robot MyPolicy"
     " rgb depth K T T_world_gripper q",
+    "docs/real_robot/recording.md": "cameras moving robot",
     "docs/real_robot/setup.md": "robot cameras",
     "docs/real_robot/viewing.md": "setup robot cameras policy",
     "docs/your_own.md": "policy mask p_world",
