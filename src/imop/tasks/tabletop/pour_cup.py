@@ -114,7 +114,7 @@ class PourCup(TableTask):
 def _ball(color: tuple[float, float, float]) -> Any:
     """A small ball; frame: its centre."""
     spec, body = part()
-    spec.joint("free").damping = [1e-4, 0, 0]
+    spec.joint("free").damping = [1e-7, 0, 0]
     sphere = mujoco.mjtGeom.mjGEOM_SPHERE
     body.add_geom(type=sphere, size=[_BALL, 0, 0], rgba=rgba(color), density=300.0)
     return spec
