@@ -15,9 +15,7 @@ _PREFIX = "clutter"
 _LARGEST = 0.034
 
 
-def add_clutter(
-    spec: Any, rng: np.random.Generator, most: int = 4, shapes: Sequence[str] = SHAPES
-) -> None:
+def add_clutter(spec: Any, rng: np.random.Generator, most: int = 4, shapes: Sequence[str] = SHAPES) -> None:
     """Add two to `most` things of random size and colour, each of one of the `shapes`."""
     for i in range(int(rng.integers(2, most + 1))):
         shape = str(rng.choice(shapes))

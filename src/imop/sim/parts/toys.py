@@ -59,7 +59,8 @@ def _duck(spec: Any, body: Any, s: float, color: Color, other: Color) -> None:
     lathe.solid(spec, body, "trunk", profile, color, PLASTIC, segments=16)
     head = np.array([0.28 * s, 0.0, low + 0.95 * s])
     _ball(body, head, 0.27 * s, color)
-    box(body, head + (0.2 * s, -0.1 * s, -0.08 * s), head + (0.42 * s, 0.1 * s, 0.04 * s), other, PLASTIC)
+    low_bill, high_bill = np.array([(0.2, -0.1, -0.08), (0.42, 0.1, 0.04)]) * s + head
+    box(body, low_bill, high_bill, other, PLASTIC)
     box(body, (-0.65 * s, -0.12 * s, low + 0.4 * s), (-0.3 * s, 0.12 * s, low + 0.6 * s), color, PLASTIC)
 
 

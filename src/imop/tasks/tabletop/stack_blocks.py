@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from imop.geometry import se3
 from imop.sim.parts.shapes import add_to
 from imop.sim.parts.solids import block
 from imop.sim.world import World
