@@ -41,13 +41,14 @@ class ItemInShelf(TableTask):
 
     name = "tabletop/item_in_shelf"
     graspable = ("item/body",)
+    sizes = (0.85, 1.1)
 
     def instructions(self, variation: int) -> tuple[str, ...]:
         return ("put the item in the shelf", "lay the item onto the lower board of the shelf")
 
     def build(self, spec: Any, variation: int, rng: np.random.Generator) -> None:
         kind = KINDS[int(rng.integers(len(KINDS)))]
-        across, up = rng.uniform(0.85, 1.1), rng.uniform(0.9, 1.15)
+        across, up = rng.uniform(0.85, 1.05), rng.uniform(0.9, 1.15)
         self.kind = replace(
             kind,
             length=across * kind.length,

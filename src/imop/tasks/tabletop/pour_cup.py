@@ -37,6 +37,7 @@ class PourCup(TableTask):
 
     name = "tabletop/pour_cup"
     graspable = ("cup/body",)
+    sizes = (0.85, 1.1)
 
     def instructions(self, variation: int) -> tuple[str, ...]:
         return ("pour the cup into the bowl", "pick up the cup and pour what is in it into the bowl")
