@@ -86,12 +86,12 @@ class PourCup(TableTask):
 
     def _poured(self) -> FloatArray:
         """T_bowl_gripper (4, 4) with the lowest point of the tilted rim over the bowl's middle."""
-        roll = self._grasp @ se3.make(se3.euler(z=_ROLL))
-        T = roll @ se3.invert(self._grasp)  # the cup's pose after the roll, in its own frame before
-        up, down = T[:3, 2], np.array([0.0, 0.0, -1.0])
-        along = down - (down @ up) * up
-        lip = T[:3, 3] + self.shape.radius * along / np.linalg.norm(along)
-        return shifted(roll, (-float(lip[0]), -float(lip[1]), _ABOVE - float(lip[2])))
+        rolled = self._grasp @ se3.make(se3.euler(z=_ROLL))
+        T_level_tilted = rolled @ se3.invert(self._grasp)
+        up, down = T_level_tilted[:3, 2], np.array([0.0, 0.0, -1.0])
+        outwards = down - (down @ up) * up
+        lip = T_level_tilted[:3, 3] + self.shape.radius * outwards / np.linalg.norm(outwards)
+        return se3.make(p=(0.0, 0.0, _ABOVE) - lip) @ rolled
 
     def waypoints(self, world: World) -> Sequence[Waypoint]:
         poured = self._poured()

@@ -20,6 +20,8 @@ from imop.tasks.waypoint import Waypoint
 _COUNT = 2
 _ROOM = 0.065
 """Around a toy, for the fingers."""
+_DROP, _RISE = 0.06, 0.03
+"""How high above the rim a toy is let go, and how high one may lie on the other, metres."""
 
 
 class ToysInBowl(TableTask):
@@ -52,7 +54,7 @@ class ToysInBowl(TableTask):
     def waypoints(self, world: World) -> Sequence[Waypoint]:
         grasp, steps = from_above(), []
         for side, body in zip((-1, 1), self.graspable, strict=True):
-            drop = from_above((0.0, side * 0.3 * self.radius, 0.06))
+            drop = from_above((0.0, side * 0.3 * self.radius, _DROP))
             steps += [
                 Waypoint(body, backed_off(grasp, 0.10), gripper_open=True),
                 Waypoint(body, grasp, gripper_open=False, allow_collisions=True, linear=True),
@@ -64,6 +66,5 @@ class ToysInBowl(TableTask):
     def success(self, world: World) -> bool:
         T_bowl_world = se3.invert(world.pose("bowl/body"))
         p = np.array([(T_bowl_world @ world.pose(body))[:3, 3] for body in self.graspable])
-        highest = 0.6 * self.toy_sizes.max()
-        inside = (np.linalg.norm(p[:, :2], axis=1) < self.radius) & (np.abs(p[:, 2]) < self.depth + highest)
+        inside = (np.linalg.norm(p[:, :2], axis=1) < self.radius) & (p[:, 2] < _RISE)
         return not world.held and bool(np.all(inside))
