@@ -19,11 +19,11 @@ from imop.tasks.waypoint import Waypoint
 
 _SLACK = 0.0003
 _LIFT, _OFF = 0.12, 0.06
-"""How far the expert lifts the cap, and how far it must be above its place to be off, metres."""
+"""How far the expert lifts the cap, and how far it must be from its place to be off, metres."""
 
 
 class OpenBottle(TableTask):
-    """Grasp the cap from above, turn it a quarter, lift it. Done when it is held 6 cm above its place."""
+    """Grasp the cap from above, turn it a quarter, lift it. Done when it is 6 cm from its place."""
 
     name = "tabletop/open_bottle"
     graspable = ("cap/body",)
@@ -56,5 +56,5 @@ class OpenBottle(TableTask):
         ]
 
     def success(self, world: World) -> bool:
-        height = (se3.invert(world.pose("bottle/body")) @ world.pose("cap/body"))[2, 3]
-        return "cap/body" in world.held and bool(height > TOP + _OFF)
+        T_bottle_cap = se3.invert(world.pose("bottle/body")) @ world.pose("cap/body")
+        return bool(np.linalg.norm(T_bottle_cap[:3, 3] - (0, 0, TOP)) > _OFF)
