@@ -102,7 +102,7 @@ def test_a_failed_attempt_is_repeated_in_another_scene_and_counted(monkeypatch, 
 
 def test_splits_do_not_overlap_and_make_up_the_suite():
     splits = SUITES["tabletop"]
-    parts = [name for split in ("base", "novel", "cross_object") for name in splits[split]]
+    parts = [name for split in ("base", "novel", "cross_object", "real") for name in splits[split]]
     assert sorted(parts) == sorted(splits["all"]) and len(set(parts)) == len(parts)
     assert chosen_tasks("tabletop", "novel", ("lid_off_pot",)) == [POT]
 

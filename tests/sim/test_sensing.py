@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from imop.errors import InvalidInput
 from imop.geometry import se3
@@ -11,6 +12,7 @@ from imop.sim.cameras import CAMERAS, observe
 from imop.sim.depth_noise import DepthNoise
 from imop.sim.sensing import Sensing, calibration_error
 from imop.sim.world import World, scene_spec
+from imop.types import CameraView
 
 
 @pytest.fixture(scope="module")
@@ -64,3 +66,16 @@ def test_cameras_that_are_not_there_see_nothing(seen):
     assert list(few.worsened(seen).views) == ["front"]
     with pytest.raises(InvalidInput, match="views"):
         Sensing({}).worsened(seen)
+
+
+@pytest.mark.parametrize("rows", [128, 480])
+def test_noise_is_alike_for_images_of_all_sizes(rows):
+    slope = np.linspace(1.0, 1.5, rows, dtype=np.float32)[:, None].repeat(rows, axis=1)
+    view = CameraView(np.zeros((rows, rows, 3), np.uint8), slope, np.diag([rows, rows, 1.0]), np.eye(4))
+    rng = np.random.default_rng(0)
+    # No pixel of a slope is at an edge, however steep it is across many pixels.
+    assert np.allclose(DepthNoise(bleed=1.0).view(view, rng).depth, slope, atol=1e-5)
+    lost = DepthNoise(holes=0.05).view(view, rng).depth == 0
+    assert np.mean(lost) == pytest.approx(0.05, abs=0.005)
+    _, count = ndimage.label(lost)
+    assert 2e-4 < lost.sum() / count / rows**2 < 5e-3

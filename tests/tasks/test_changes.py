@@ -7,7 +7,7 @@ from imop.errors import InvalidInput
 from imop.geometry import se3
 from imop.geometry.cloud import fuse
 from imop.geometry.neighbours import nearest
-from imop.sim.cameras import CAMERAS, observe
+from imop.sim.cameras import CAMERAS, TWO_CAMERAS, observe
 from imop.tasks.changes import FACTORS, SCENE, Change, changes_of, factors_of, read_factors
 from imop.tasks.checks import overlaps, settle
 from imop.tasks.env import make_task
@@ -120,6 +120,23 @@ def test_a_camera_is_missing_in_demonstration_and_test():
     )
 
 
+def test_two_cameras_are_all_there_is_and_their_errors_are_those_of_the_set_up():
+    rig = change("two_cameras,calibration,d415")
+    assert rig.shown.cameras == rig.tested.cameras == TWO_CAMERAS
+    assert rig.shown.T_camera_told.keys() == TWO_CAMERAS.keys()
+    for name, error in rig.shown.T_camera_told.items():
+        assert np.array_equal(error, rig.tested.T_camera_told[name])
+
+
+def test_two_cameras_see_the_same_surfaces_as_the_four_do(plain):
+    seen = change("two_cameras").tested(plain, 0)
+    assert all(view.depth.shape == (480, 640) for view in seen.views.values())
+    there = fuse(seen).points
+    on_table = there[(there[:, 2] > 0.745) & (np.abs(there[:, :2] - (0.25, 0)) < (0.25, 0.35)).all(axis=1)]
+    few = on_table[:: len(on_table) // 1000]
+    assert np.median(nearest(few, fuse(observe(plain)).points)[0]) < 0.006
+
+
 def test_noise_of_the_test_is_not_that_of_the_demonstration(plain):
     noisy = change("d415")
     a, b = (sensing(plain, 0).views["front"].depth for sensing in (noisy.shown, noisy.tested))
@@ -135,7 +152,7 @@ def test_the_same_seeds_make_the_same_change():
         assert np.array_equal(seen.rgb, other.rgb) and np.array_equal(seen.depth, other.depth)
         assert np.array_equal(seen.T_world_camera, other.T_world_camera)
     another = change(everything, seed=SEED + 1)
-    assert another.tested.cameras["front"] is not changed.tested.cameras["front"]
+    assert another.tested.cameras["left"] is not changed.tested.cameras["left"]
 
 
 @pytest.mark.parametrize("name", [POT, CUBES])

@@ -17,7 +17,7 @@ class EvaluationConfig:
 
     Attributes:
         suite: tabletop, rlbench, or one's own, such as my_suite:SUITE.
-        split: base, novel, cross_object, chain, chain_novel (tabletop), long (rlbench) or all.
+        split: base, novel, cross_object, real, chain, chain_novel (tabletop), long (rlbench) or all.
         tasks: names within the split; all if none is given.
         methods: any of replay, textbook (FPFH, RANSAC and ICP of Open3D, extra baselines), registration,
             learned (the routing network may go back to a step), advancing (learned, but steps follow each
@@ -30,7 +30,7 @@ class EvaluationConfig:
         instances: whether the scenes show the same objects, or in each scene others of their kind.
         change: what the scenes differ in from the demonstrated ones, joined by commas: object_color,
             object_size, light, table_color, distractors, camera_pose, or all of these as all; errors of the
-            sensors d415, calibration, knocked, fewer_cameras. docs/tasks.md says what they are.
+            sensors d415, calibration, knocked; two_cameras, fewer_cameras. docs/tasks.md says what they are.
         disturb: what goes wrong once in every episode: what is about to be acted on is moved by 10 cm, what
             was taken is knocked out of the hand, missed by it, or what was opened is pushed shut.
         second_try: go on after a motion that cannot be planned, up to the task's limit of actions; always

@@ -16,6 +16,7 @@ from imop.evaluation.fingerprint import code_digest, own_code_digest
 from imop.evaluation.splits import chosen_tasks
 from imop.robots import arm_name
 from imop.sim.arms import PANDA, find_arm
+from imop.sim.cameras import CAMERAS, TWO_CAMERAS
 from imop.sim.sensing import Sensing
 from imop.tasks.changes import FACTORS, Change, changes_of, read_factors
 from imop.tasks.disturbances import can_happen, require_disturbance
@@ -156,7 +157,8 @@ def demonstrations_for(trial: Trial, kept: Path | None = None) -> list[Demonstra
 def _demonstration(trial: Trial, first_seed: int, instance: int, kept: Path | None) -> Demonstration:
     recorded = Memory(kept, verbose=0, compress=1).cache(_recorded)
     variation = trial.demonstrated.variation
-    asked = expert_state(trial.task), trial.task, variation, instance, first_seed, trial.robot
+    two_cameras = trial.changed.cameras is TWO_CAMERAS
+    asked = expert_state(trial.task), trial.task, variation, instance, first_seed, trial.robot, two_cameras
     return _seen(recorded(*asked), trial.changed.shown)
 
 
@@ -172,12 +174,13 @@ def _recorded(
     instance: int,
     first_seed: int,
     robot: str,
+    two_cameras: bool,
 ) -> Demonstration:
     """The first demonstration that succeeds; what is kept is that of the same `code`."""
-    task = make_task(name)
+    task, cameras = make_task(name), TWO_CAMERAS if two_cameras else CAMERAS
     for seed in range(first_seed, first_seed + _RECORDING_ATTEMPTS):
         try:
-            return record_demonstration(task, seed, variation, instance, arm=find_arm(robot))
+            return record_demonstration(task, seed, variation, instance, arm=find_arm(robot), cameras=cameras)
         except (ExpertFailed, NoRoom) as error:
             failure: ImopError = error
     raise failure

@@ -8,6 +8,7 @@ from typing import Literal
 from imop.evaluation.config import Instances
 from imop.evaluation.trials import Trial, disturbed, suite_trials
 from imop.reproduce.published import Published
+from imop.sim.arms import PANDA
 from imop.sim.parts.grocery import GROCERIES
 from imop.tasks.suites import find_suite
 from imop.tasks.task import Task
@@ -90,11 +91,15 @@ class SuiteSection(Section):
         suite: name of the suite.
         split: which of its tasks.
         instances: whether the scenes show the demonstrated objects or others of their kind.
+        change: see `suite_trials`.
+        robot: the arm that shows and acts.
     """
 
     suite: str = "rlbench"
     split: str = "base"
     instances: Instances = "same"
+    change: str = ""
+    robot: str = PANDA.name
 
     def trials(self, episodes: int, seed: int) -> dict[str, list[Trial]]:
         """As `imop eval` would try them.
@@ -103,7 +108,11 @@ class SuiteSection(Section):
             InvalidInput: if there is no such suite or split.
             AssetMissing: if no task can be tried.
         """
-        return suite_trials(self.suite, self.split, (), episodes, seed, 0, other=self.instances == "other")
+        other = self.instances == "other"
+        trials = suite_trials(self.suite, self.split, (), episodes, seed, 0, self.change, other)
+        return {
+            task: [replace(trial, robot=self.robot) for trial in of_task] for task, of_task in trials.items()
+        }
 
     def absent(self) -> list[str]:
         """Tasks of the split whose files are missing."""

@@ -1,4 +1,4 @@
-"""RLBench's four cameras, drawn with rays: colour, depth and instance ids without OpenGL.
+"""Cameras drawn with rays: colour, depth and instance ids without OpenGL. RLBench's four, and a pair of D415.
 
 Camera frames are OpenCV's: x right, y down, z forward. Pixel (u, v) looks along inv(K) (u, v, 1), so depth is
 measured along the optical axis. Nothing hit, or farther than the far plane, is depth 0 and instance 0.
@@ -34,12 +34,14 @@ class Camera:
         field_of_view: vertical, radians.
         far: metres; what lies beyond is not measured.
         on_gripper: whether the camera moves with the gripper.
+        size: width and height of its images, pixels; None if it takes any that are asked for.
     """
 
     T_mount_camera: FloatArray
     field_of_view: float
     far: float
     on_gripper: bool = False
+    size: tuple[int, int] | None = None
 
     def intrinsics(self, width: int, height: int) -> FloatArray:
         """(3, 3) pixels; the principal point is (width / 2, height / 2)."""
@@ -74,6 +76,27 @@ CAMERAS: dict[str, Camera] = {
         on_gripper=True,
     ),
 }
+
+
+def look_at(
+    eye: tuple[float, float, float],
+    target: tuple[float, float, float],
+    fov_degrees: float,
+    size: tuple[int, int] | None = None,
+) -> Camera:
+    """A fixed camera at `eye` that looks at `target`, upright."""
+    z = np.subtract(target, eye) / np.linalg.norm(np.subtract(target, eye))
+    x = np.cross(z, (0.0, 0.0, 1.0))
+    x /= np.linalg.norm(x)
+    R = np.stack([x, np.cross(z, x), z], axis=1)
+    return Camera(se3.make(R, eye), float(np.radians(fov_degrees)), 10.0, size=size)
+
+
+TWO_CAMERAS: dict[str, Camera] = {
+    "left": look_at((0.45, 1.1, 1.6), (0.2, 0.0, 0.82), 40.0, (640, 480)),
+    "right": look_at((0.45, -1.1, 1.6), (0.2, 0.0, 0.82), 40.0, (640, 480)),
+}
+"""As one puts two RealSense D415 beside a table, with the field of view of their depth images."""
 
 
 def _colours(model: Any) -> FloatArray:
@@ -154,8 +177,10 @@ def camera_view(world: World, camera: Camera, width: int, height: int) -> Camera
 
 
 def render(world: World, size: int = 128, cameras: Mapping[str, Camera] = CAMERAS) -> dict[str, CameraView]:
-    """What all cameras see, `size` x `size` pixels."""
-    return {name: camera_view(world, camera, size, size) for name, camera in cameras.items()}
+    """What all cameras see, `size` x `size` pixels where a camera has no size of its own."""
+    return {
+        name: camera_view(world, camera, *(camera.size or (size, size))) for name, camera in cameras.items()
+    }
 
 
 def render_view(world: World, camera: str | Camera, width: int = 320, height: int = 240) -> ByteArray:
@@ -173,21 +198,10 @@ def render_view(world: World, camera: str | Camera, width: int = 320, height: in
     return _shade(world, hits).reshape(height, width, 3)
 
 
-def look_at(
-    eye: tuple[float, float, float], target: tuple[float, float, float], fov_degrees: float
-) -> Camera:
-    """A fixed camera at `eye` that looks at `target`, upright."""
-    z = np.subtract(target, eye) / np.linalg.norm(np.subtract(target, eye))
-    x = np.cross(z, (0.0, 0.0, 1.0))
-    x /= np.linalg.norm(x)
-    R = np.stack([x, np.cross(z, x), z], axis=1)
-    return Camera(se3.make(R, eye), float(np.radians(fov_degrees)), 10.0)
-
-
 def observe(
     world: World, time_step: int = 0, size: int = 128, cameras: Mapping[str, Camera] = CAMERAS
 ) -> Observation:
-    """What the robot sees (images of `size` x `size`) and feels now, with instance ids for training."""
+    """What the robot sees (images as of `render`) and feels now, with instance ids for training."""
     return Observation(
         views=render(world, size, cameras),
         T_world_gripper=world.T_world_gripper,

@@ -10,6 +10,8 @@ from imop.types import BoolArray, CameraView, Float32Array, Observation
 
 _FOCAL_TIMES_BASELINE = 0.055 * 450
 """Metres times pixels; turns disparity (pixels) into depth."""
+_ROWS = 128
+"""Of an image for which lengths in pixels are meant; they are multiples of that in an image of more rows."""
 
 
 @dataclass(frozen=True)
@@ -58,16 +60,17 @@ class DepthNoise:
         if not (self.disparity or self.wave or self.bleed or self.holes or self.calibration):
             return view
         depth = view.depth.copy()
-        edge = _edges(depth)
+        height, width = depth.shape
+        grain = max(1, round(height / _ROWS))
+        edge = _edges(depth, grain)
         moved = edge & (rng.random(depth.shape) < self.bleed)
         row, column = np.nonzero(moved)
-        shift = rng.integers(-1, 2, (2, len(row)))
-        height, width = depth.shape
+        shift = rng.integers(-grain, grain + 1, (2, len(row)))
         depth[row, column] = view.depth[
             np.clip(row + shift[0], 0, height - 1), np.clip(column + shift[1], 0, width - 1)
         ]
-        depth = self._measured(depth, rng)
-        lost = ndimage.gaussian_filter(rng.normal(size=depth.shape), 1.5)
+        depth = self._measured(depth, rng, 2.0 * grain)
+        lost = ndimage.gaussian_filter(rng.normal(size=depth.shape), 1.5 * grain)
         lost = lost / max(float(lost.std()), 1e-9)
         threshold = np.quantile(lost, 1 - self.holes) if self.holes else np.inf
         depth[(lost > threshold) | (edge & (rng.random(depth.shape) < 2 * self.holes))] = 0.0
@@ -75,11 +78,11 @@ class DepthNoise:
         T = view.T_world_camera @ se3.make(se3.euler(*error[3:]), error[:3])
         return replace(view, depth=depth, T_world_camera=T)
 
-    def _measured(self, depth: Float32Array, rng: np.random.Generator) -> Float32Array:
-        """Depth after its disparity was disturbed and rounded."""
+    def _measured(self, depth: Float32Array, rng: np.random.Generator, sigma: float) -> Float32Array:
+        """Depth after its disparity was disturbed, alike within `sigma` pixels, and rounded."""
         seen = depth > 0
         disparity = _FOCAL_TIMES_BASELINE / np.where(seen, depth, 1.0)
-        smooth = ndimage.gaussian_filter(rng.normal(size=depth.shape), 2.0)
+        smooth = ndimage.gaussian_filter(rng.normal(size=depth.shape), sigma)
         disparity = disparity + self.wave * smooth / max(float(smooth.std()), 1e-9)
         if self.disparity:
             disparity = np.round(disparity / self.disparity) * self.disparity
@@ -87,7 +90,7 @@ class DepthNoise:
         return np.where(seen, worse, 0.0).astype(np.float32)
 
 
-def _edges(depth: Float32Array, gap: float = 0.02) -> BoolArray:
-    """(H, W) True where the depth jumps by more than `gap` metres nearby."""
+def _edges(depth: Float32Array, grain: int, gap: float = 0.02) -> BoolArray:
+    """(H, W) True within `grain` pixels of where the depth jumps by more than `gap` metres."""
     far, near = ndimage.maximum_filter(depth, 3), ndimage.minimum_filter(depth, 3)
-    return np.asarray(far - near > gap)
+    return np.asarray(ndimage.maximum_filter(far - near > gap, 2 * grain - 1))

@@ -13,7 +13,7 @@ import numpy as np
 
 from imop.errors import InvalidInput
 from imop.geometry import se3
-from imop.sim.cameras import CAMERAS, VISIBLE_GROUPS, Camera
+from imop.sim.cameras import CAMERAS, TWO_CAMERAS, VISIBLE_GROUPS, Camera
 from imop.sim.depth_noise import DepthNoise
 from imop.sim.sensing import Sensing, calibration_error
 from imop.sim.world import World
@@ -31,6 +31,7 @@ FACTORS: dict[str, str] = {
     "d415": "Depth is as noisy as that of a RealSense D415, in demonstration and test.",
     "calibration": "Every camera is 3 mm and 0.5 degrees from where it says, in demonstration and test.",
     "knocked": "Every camera is moved by 3 mm and 0.5 degrees before the test, without saying so.",
+    "two_cameras": "Two cameras of 640 x 480 pixels beside the table are all, in demonstration and test.",
     "fewer_cameras": "The camera right_shoulder is missing, in demonstration and test.",
 }
 """What may be changed -> what that means."""
@@ -132,19 +133,24 @@ class Change:
         if "distractors" in self.factors:
             place_distractors(task, world, self._rng("distractors", self.seed, 1))
 
+    @property
+    def cameras(self) -> Mapping[str, Camera]:
+        """What the set-up has, before one is lost or moved."""
+        return TWO_CAMERAS if "two_cameras" in self.factors else CAMERAS
+
     @cached_property
     def shown(self) -> Sensing:
         """How the demonstration is seen."""
-        return Sensing(self._there(CAMERAS), self._misplaced(), self._noise(), (*self.setup, 0))
+        return Sensing(self._there(self.cameras), self._misplaced(), self._noise(), (*self.setup, 0))
 
     @cached_property
     def tested(self) -> Sensing:
         """How the test is seen."""
-        cameras, errors = CAMERAS, self._misplaced()
+        cameras, errors = self.cameras, self._misplaced()
         if "camera_pose" in self.factors:
-            cameras = _moved(CAMERAS, self._rng("camera_pose", self.seed))
+            cameras = _moved(cameras, self._rng("camera_pose", self.seed))
         if "knocked" in self.factors:
-            knocks = _errors(self._rng("knocked", self.seed))
+            knocks = _errors(self.cameras, self._rng("knocked", self.seed))
             errors = {name: knock @ errors.get(name, np.eye(4)) for name, knock in knocks.items()}
         return Sensing(self._there(cameras), errors, self._noise(), (*self.setup, 1, self.seed))
 
@@ -153,14 +159,14 @@ class Change:
         return {name: camera for name, camera in cameras.items() if name not in lost}
 
     def _misplaced(self) -> dict[str, FloatArray]:
-        return _errors(self._rng("calibration")) if "calibration" in self.factors else {}
+        return _errors(self.cameras, self._rng("calibration")) if "calibration" in self.factors else {}
 
     def _noise(self) -> DepthNoise | None:
         return DepthNoise.of_d415() if "d415" in self.factors else None
 
 
-def _errors(rng: np.random.Generator) -> dict[str, FloatArray]:
-    return {name: calibration_error(rng, _DISTANCE, _ANGLE) for name in CAMERAS}
+def _errors(cameras: Mapping[str, Camera], rng: np.random.Generator) -> dict[str, FloatArray]:
+    return {name: calibration_error(rng, _DISTANCE, _ANGLE) for name in cameras}
 
 
 def _moved(cameras: Mapping[str, Camera], rng: np.random.Generator) -> dict[str, Camera]:

@@ -1,5 +1,6 @@
 """Things on the table that no task needs."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,10 @@ _PREFIX = "clutter"
 _LARGEST = 0.034
 
 
-def add_clutter(spec: Any, rng: np.random.Generator, most: int = 4) -> None:
-    """Add two to `most` things of random shape, size and colour."""
+def add_clutter(spec: Any, rng: np.random.Generator, most: int = 4, shapes: Sequence[str] = SHAPES) -> None:
+    """Add two to `most` things of random size and colour, each of one of the `shapes`."""
     for i in range(int(rng.integers(2, most + 1))):
-        shape = str(rng.choice(SHAPES))
+        shape = str(rng.choice(shapes))
         radius, height = rng.uniform(0.018, _LARGEST), rng.uniform(0.03, 0.09)
         add_to(spec, f"{_PREFIX}{i}", trinket(shape, radius, height, random_color(rng)))
 

@@ -26,3 +26,9 @@ def backed_off(T_frame_gripper: FloatArray, distance: float) -> FloatArray:
 def shifted(T_frame_gripper: FloatArray, p: tuple[float, float, float]) -> FloatArray:
     """The pose moved by `p` in the frame of the body."""
     return se3.make(p=p) @ T_frame_gripper
+
+
+def from_side(p: tuple[float, float, float] = (0.0, 0.0, 0.0), pitch: float = 0.0) -> FloatArray:
+    """T_frame_gripper (4, 4): along the frame's x axis and down by `pitch`, closing along its y axis."""
+    y, z = np.array([0.0, 1.0, 0.0]), np.array([np.cos(pitch), 0.0, -np.sin(pitch)])
+    return se3.make(np.stack([np.cross(y, z), y, z], axis=1), p)

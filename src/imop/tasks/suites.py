@@ -21,6 +21,7 @@ SUITES: dict[str, Suite] = {
         "base": tabletop.BASE,
         "novel": tabletop.NOVEL,
         "cross_object": tabletop.CROSS_OBJECT,
+        "real": tabletop.REAL,
         "chain": tabletop.CHAIN,
         "chain_novel": tabletop.CHAIN_NOVEL,
         "all": tabletop.TABLETOP,

@@ -18,7 +18,7 @@ DROP = 0.004
 TOP = 0.004
 SKIRT = 0.016
 LID_HEIGHT = TOP + SKIRT
-_NECK_LENGTH, _NECK_WALL = 0.026, 0.003
+NECK_LENGTH, NECK_WALL = 0.026, 0.003
 _LUG_LOW, _LUG = -0.0115, 0.003
 """Underside and thickness of a lug, below the lid's inner top."""
 _FLANK, _DEPTH, _PLAY = 0.002, 0.003, 0.0007
@@ -52,15 +52,15 @@ def jar(shape: JarShape, color: Color, content_color: Color, label_color: Color)
     a clockwise `TURN`.
     """
     spec, body = part(fixed=True)
-    r, base, shoulder = shape.radius, -shape.height, -_NECK_LENGTH
+    r, base, shoulder = shape.radius, -shape.height, -NECK_LENGTH
     profile = [(0.9 * r, base), (r, base + 0.006), (r, shoulder - 0.012), (shape.neck + 0.002, shoulder)]
     lathe.solid(spec, body, "belly", profile, color, PLASTIC)
     neck = [(shape.neck, shoulder), (shape.neck, 0.0)]
-    lathe.shell(spec, body, "neck", neck, _NECK_WALL, color, PLASTIC, segments=20)
-    cylinder(body, shape.neck - _NECK_WALL, shoulder, -0.015, content_color, WOOD)
-    middle, half = (base + shoulder) / 2, 0.3 * (shape.height - _NECK_LENGTH)
+    lathe.shell(spec, body, "neck", neck, NECK_WALL, color, PLASTIC, segments=20)
+    cylinder(body, shape.neck - NECK_WALL, shoulder, -0.015, content_color, WOOD)
+    middle, half = (base + shoulder) / 2, 0.3 * (shape.height - NECK_LENGTH)
     box(body, (0.9 * r, -0.45 * r, middle - half), (r + 0.001, 0.45 * r, middle + half), label_color, PLASTIC)
-    _thread(spec, body, shape.neck, color)
+    thread(spec, body, shape.neck, color)
     return spec
 
 
@@ -69,7 +69,7 @@ def _lug_low(angle: float) -> float:
     return _LUG_LOW + DROP * (1 - float(np.clip(angle / TURN, 0, 1)))
 
 
-def _thread(spec: Any, body: Any, neck: float, color: Color) -> None:
+def thread(spec: Any, body: Any, neck: float, color: Color) -> None:
     """Flanks below and above the way of each lug, and a stop at its end."""
 
     def below(angle: float) -> tuple[float, float]:
