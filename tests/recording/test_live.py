@@ -1,13 +1,18 @@
+from contextlib import nullcontext
 from dataclasses import replace
 
 import pytest
 
 from imop.calibration.collect import Rig
+from imop.cli import main
 from imop.errors import InvalidInput
+from imop.recording import live
 from imop.recording.folder import read_folder
 from imop.recording.live import GAP, record_live
 from imop.recording.recorder import DemonstrationRecorder
 from imop.robots.interfaces import DONE
+from imop.setup import drivers
+from imop.setup.file import save_setup
 from tests.recording import takes
 
 
@@ -57,6 +62,17 @@ def test_a_clock_that_began_anew_goes_on_after_a_gap(tmp_path):
             record_live(recorder, rig(later), 200.0, typed(None, None, None, ""))
     stamps = read_folder(tmp_path / "take").motion.times
     assert len(stamps) == 6 and stamps[3] - stamps[2] == pytest.approx(GAP)
+
+
+def test_the_set_up_names_the_drivers(tmp_path, monkeypatch):
+    cell, count = tmp_path / "cell.toml", len(list(takes.moments()))
+    save_setup(takes.cell(), cell)
+    monkeypatch.setattr(drivers, "connected", lambda setup: nullcontext((Arm(), rig().cameras)))
+    monkeypatch.setattr(live, "typed_lines", lambda: typed(*[None] * count, ""))
+    with pytest.raises(SystemExit) as ended:
+        main(["record", str(tmp_path / "take"), "--setup", str(cell), "--rate", "200"])
+    assert not ended.value.code
+    assert len(read_folder(tmp_path / "take").motion) == count
 
 
 def test_a_rate_has_limits(tmp_path):

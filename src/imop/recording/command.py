@@ -1,7 +1,8 @@
 """`imop record`: record a demonstration, look at its keyframes, change them, and store it."""
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -15,6 +16,7 @@ from imop.terminal import console, status
 if TYPE_CHECKING:
     from imop.calibration.collect import Rig
     from imop.recording.draft import Draft
+    from imop.setup.setup import Setup
 
 _HELP = "move 2:+5, add 40, remove 3, picture, save, quit"
 
@@ -63,8 +65,8 @@ def record(
     Args:
         folder: of the recording: new, or as an earlier call left it.
         simulation: the expert, if it is no real arm.
-        setup: the set-up (docs/real_robot/setup.md), for a real arm.
-        rig: module:function that returns the drivers of arm and cameras, an imop.calibration.collect.Rig.
+        setup: the set-up (docs/real_robot/setup.md), for a real arm; it may name the drivers.
+        rig: module:function that returns other drivers of arm and cameras, an imop.calibration.collect.Rig.
         rate: frames per second.
         kind: how the task is shown.
         task: a name for it, for bookkeeping.
@@ -80,19 +82,19 @@ def record(
     from imop.recording.keyframes_file import load_draft, save_draft
 
     if is_recording(folder) and (folder / KEYFRAMES).exists():
-        if simulation.simulated or rig:
+        if simulation.simulated or rig or setup:
             console.print(f"{folder} holds a recording that has ended; a new one needs a new folder")
         draft = load_draft(folder)
     elif simulation.simulated:
         draft = _simulated(folder, simulation, rate)
-    elif rig:
+    elif rig or setup:
         draft = _live(folder, setup, rig, rate, kind, task, instruction)
     elif is_recording(folder):
         draft = load_draft(folder)
-        console.print(f"{folder}: the recording ends here; with --rig or --simulated it would go on")
+        console.print(f"{folder}: the recording ends here; with --setup or --simulated it would go on")
     else:
-        accepted = "--setup FILE and --rig MODULE:FUNCTION of a real arm, or --simulated SUITE/TASK"
-        raise InvalidInput("rig", f"missing, and nothing is recorded in {folder}", accepted)
+        accepted = "--setup FILE of a real arm, or --simulated SUITE/TASK"
+        raise InvalidInput("setup", f"missing, and nothing is recorded in {folder}", accepted)
     draft = edited(draft, move, add, remove)
     save_draft(draft, folder)
     _show(draft, folder)
@@ -140,8 +142,10 @@ def _live(
         raise InvalidInput("setup", "missing", accepted)
     known = load_setup(setup)
     words = (instruction,) if instruction else ()
-    drivers = _rig(rig)
-    with DemonstrationRecorder.start(folder, known, task=task, instructions=words, kind=kind) as recorder:
+    with (
+        _drivers(known, rig) as drivers,
+        DemonstrationRecorder.start(folder, known, task=task, instructions=words, kind=kind) as recorder,
+    ):
         if recorder.count:
             console.print(f"{folder}: goes on after {recorder.count} frames")
         console.print("recording; Enter ends it, o Enter and c Enter open and close the gripper")
@@ -149,10 +153,18 @@ def _live(
     return recorder.stop()
 
 
-def _rig(name: str) -> "Rig":
+@contextmanager
+def _drivers(setup: "Setup", rig: str) -> Iterator["Rig"]:
+    """Those of a function, or, without a name, those that the set-up names."""
+    from imop.calibration.collect import Rig
     from imop.calibration.command import find_rig
+    from imop.setup.drivers import connected
 
-    return find_rig(name)
+    if rig:
+        yield find_rig(rig)
+        return
+    with connected(setup) as (robot, cameras):
+        yield Rig(robot, cameras)
 
 
 def _show(draft: "Draft", folder: Path) -> None:
