@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 # One thread per process: two cores are better spent on two processes.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: install demo test coverage lint docs wheel test-wheel test-lowest lock clean
+.PHONY: install demo robot-demo test coverage lint docs wheel test-wheel test-lowest lock clean
 
 install: $(STAMP)
 
@@ -17,6 +17,18 @@ $(STAMP): pyproject.toml constraints.txt
 
 demo: install
 	$(BIN)/imop run --task tabletop/lid_off_pot --seed 1 --out runs/demo
+
+# From the calibration of cameras to the first motion, against the simulator; see docs/real-robot.md.
+ROBOT_DEMO := runs/robot_demo
+robot-demo: install
+	rm -rf $(ROBOT_DEMO)
+	$(BIN)/imop calibrate collect $(ROBOT_DEMO)/pictures --simulated beside
+	$(BIN)/imop calibrate solve $(ROBOT_DEMO)/pictures
+	$(BIN)/imop setup check examples/simulated_cell.toml
+	$(BIN)/imop record $(ROBOT_DEMO)/drawer --simulated tabletop/open_drawer --seed 1 --save --store $(ROBOT_DEMO)/demo.zarr
+	$(BIN)/imop check $(ROBOT_DEMO)/demo.zarr
+	$(BIN)/imop run --robot examples/simulated_cell.toml --demo $(ROBOT_DEMO)/demo.zarr \
+		--task tabletop/open_drawer --seed 2 --out $(ROBOT_DEMO)/run
 
 test: install lint
 	$(BIN)/pytest -n 2 --dist worksteal
