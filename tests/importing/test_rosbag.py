@@ -117,6 +117,23 @@ def test_what_is_no_bag_is_said(tmp_path):
         find_sources("rosbag", tmp_path / "nowhere")
 
 
+def test_damaged_bags_end_in_clear_errors(tmp_path, rng):
+    bag = bags.write(tmp_path / "bag", bags.messages())
+    (file,) = bag.glob("*.mcap")
+    whole = file.read_bytes()
+    for k in range(12):
+        damaged = bytearray(whole)
+        if k % 2:
+            damaged = damaged[: int(rng.integers(len(whole)))]
+        for place in rng.integers(0, max(len(damaged), 1), 20) if not k % 2 else ():
+            damaged[place] = int(rng.integers(256))
+        file.write_bytes(bytes(damaged))
+        try:
+            read_bag(bag, Side()).observation(3)
+        except (CorruptData, InvalidInput):
+            continue
+
+
 def test_compressed_images_are_read():
     import io
 

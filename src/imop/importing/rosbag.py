@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from imop.errors import CorruptData, InvalidInput
+from imop.errors import CorruptData, ImopError, InvalidInput
 from imop.extras import extra
 from imop.geometry import se3
 from imop.importing.episode import Episode, Images, complete_cameras, kinematic_poses, opening_of
@@ -60,15 +60,19 @@ class Contents:
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
     with extra("import"):
-        from rosbags.highlevel import AnyReader, AnyReaderError
+        from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
             yield reader
+    except ImopError:
+        raise
     except FileNotFoundError as error:
         raise CorruptData(path, "there is no bag", "give the folder of a bag, or an .mcap file") from error
-    except AnyReaderError as error:
-        raise CorruptData(path, f"cannot be read as a bag ({error})", _REMEDY) from error
+    except Exception as error:  # a damaged bag can fail in any way at all
+        raise CorruptData(
+            path, f"cannot be read as a bag ({type(error).__name__}: {error})", _REMEDY
+        ) from error
 
 
 def read_contents(path: Path) -> Contents:
