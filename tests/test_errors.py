@@ -2,21 +2,23 @@ import importlib
 import inspect
 import pickle
 import pkgutil
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 from joblib import Parallel, delayed
 
 import imop
-from imop.errors import CorruptData, ImopError
+from imop.errors import CorruptData, ImopError, MissingExtra
 
 SAMPLES = {str: "words [in brackets]", int: 7, float: 0.25, Path: Path("a/b.zarr"), object: "unreachable"}
 
 
 def kinds():
-    """Every error that the package defines, after all of it was imported."""
+    """Every error that the package defines, after all of it that is installed was imported."""
     for module in pkgutil.walk_packages(imop.__path__, "imop."):
-        importlib.import_module(module.name)
+        with suppress(MissingExtra):  # drivers of real arms and cameras
+            importlib.import_module(module.name)
     found, new = set(), {ImopError}
     while new:
         found |= new

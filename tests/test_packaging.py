@@ -22,6 +22,7 @@ MODULES = {
     "view": ("viser", "websockets"),
     "calibrate": ("cv2",),
     "serve": ("msgpack", "websockets"),
+    "import": ("rosbags", "pyarrow"),
     "franka": ("franky",),
     "universal_robots": ("rtde_control", "rtde_receive", "dashboard_client"),
     "realsense": ("pyrealsense2",),

@@ -15,7 +15,7 @@ from imop.types import CameraView, FloatArray, Observation
 RobotDistance = Callable[[FloatArray, FloatArray, float], FloatArray]
 """Points (N, 3), world frame, joint positions, opening -> (N,) metres to the robot, negative inside."""
 
-VIEWS_FAR = 1.0
+VIEWS_FAR = 0.6
 """Millimetres by which surfaces of two views may be farther apart than they need to be."""
 ROBOT_FAR = 3.5
 """Millimetres by which the robot may seem to be elsewhere; models of arms are not exact."""
