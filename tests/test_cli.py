@@ -17,7 +17,6 @@ from imop.robots.panda import T_WORLD_BASE
 from imop.tasks.disturbances import DISTURBANCES
 from imop.training.data.shards import write_shard
 from imop.viewing.cases import from_result
-from tests.serving.running import serving
 from tests.training.data.test_pairs import pair
 
 VERBS = (
@@ -156,9 +155,11 @@ def test_view_asks_in_the_terminal_and_moves_nothing_before_a_yes(store, monkeyp
 
 
 def test_a_server_decides_what_is_viewed_and_what_it_needs_is_said(store, monkeypatch, capsys):
+    pytest.importorskip("msgpack", reason="the extra serve is not installed")
+    running = pytest.importorskip("tests.serving.running")
     monkeypatch.setattr("imop.viewing.command.console.input", lambda question: "q")
     recording = ("view", "--demo", store, "--scene", store, "--confirm")
-    with serving(ReplayPolicy, key="secret") as server:
+    with running.serving(ReplayPolicy, key="secret") as server:
         address = f"127.0.0.1:{server.port}"
         assert imop(*recording, "--server", address, "--key", "secret") == 1
         assert "open" in capsys.readouterr().out
